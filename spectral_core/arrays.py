@@ -1,0 +1,16 @@
+"""Array types and the one helper all value objects share."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+Float64Array = npt.NDArray[np.float64]
+Float32Array = npt.NDArray[np.float32]
+
+
+def frozen(values: npt.ArrayLike) -> Float64Array:
+    """A float64 copy that cannot be written to: fields of frozen dataclasses stay what they were."""
+    array = np.array(values, dtype=np.float64)
+    array.setflags(write=False)
+    return array

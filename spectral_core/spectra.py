@@ -1,0 +1,203 @@
+"""Tables of spectra: SPDs and reflectances, and reading them from CSV."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from spectral_core.arrays import Float64Array, frozen
+from spectral_core.errors import SpectrumError
+
+Quantity = Literal["power", "reflectance"]
+
+# Wider than any file a colour scientist has: UV to short-wave infrared.
+_PLAUSIBLE_NM = (100.0, 5000.0)
+_VISIBLE_NM = (360.0, 830.0)
+# Above this a reflectance is a percentage or a raw count; fluorescent samples stay below it.
+_LARGEST_REFLECTANCE = 2.0
+_LARGEST_FILE_BYTES = 256 * 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Spectra on one wavelength grid.
+
+    Attributes
+    ----------
+    names
+        One per spectrum.
+    wavelengths_nm
+        (n,), ascending.
+    values
+        (spectra, n).
+    named
+        False if the file had no header and the names are numbers.
+    lines
+        True if the values are powers of spectral lines at the wavelengths, not samples of a curve.
+    warnings
+        What a user should know of the table.
+    """
+
+    names: tuple[str, ...]
+    wavelengths_nm: Float64Array
+    values: Float64Array
+    named: bool = True
+    lines: bool = False
+    warnings: tuple[str, ...] = ()
+
+
+def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
+    """Read a CSV of spectra: first column nm, one column a spectrum, header optional.
+
+    Comma, semicolon or tab separated; ``#`` starts a comment; ``# kind: lines`` makes every row an
+    exact spectral line. A table from long to short wavelengths is turned round.
+
+    Raises
+    ------
+    SpectrumError
+        With file and line, for anything that is not such a table.
+    """
+    path = Path(path)
+    rows, lines = _rows(path)
+    header, body = _split_header(path, rows)
+    width = len(body[0][1])
+    if width < 2:
+        raise SpectrumError("one column only", where=_at(path, body[0][0]), remedy="give wavelengths in nm and at least one spectrum, separated by commas")
+    table = np.array([_numbers(path, line, cells, width) for line, cells in body])
+    wavelengths, values = _ascending(path, body, table[:, 0], table[:, 1:].T)
+    _check_wavelengths(path, wavelengths, needs_curve=not lines)
+    warnings = _check_values(path, wavelengths, values, quantity)
+    if header is not None and len(header) != width:
+        raise SpectrumError(f"the header has {len(header)} columns, the data {width}", where=path, remedy="name every column")
+    names = tuple(name.strip() for name in header[1:]) if header else tuple(str(i + 1) for i in range(width - 1))
+    return Spectra(names, frozen(wavelengths), frozen(values), header is not None, lines, tuple(warnings))
+
+
+def write_spectra(path: Path, wavelengths_nm: Float64Array, values: Float64Array, names: tuple[str, ...], lines: bool = False) -> None:
+    """Write spectra (spectra, n) as CSV that `read_spectra` gives back bit for bit."""
+    from spectral_core.files import atomic_path
+
+    with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
+        if lines:
+            stream.write("# kind: lines\n")
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(["wavelength_nm", *names])
+        for index, wavelength in enumerate(wavelengths_nm):
+            writer.writerow([repr(float(wavelength)), *(repr(float(row[index])) for row in values)])
+
+
+def _rows(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
+    """(line number, cells) of every row that is not blank or a comment, and whether rows are lines."""
+    text = read_text(path)
+    content = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
+    lines = any(line.replace(" ", "").casefold() == "#kind:lines" for _, line in content)
+    kept = [(number, line.split("#")[0].strip()) for number, line in content if line and not line.startswith("#")]
+    if not kept:
+        raise SpectrumError("the file holds no data", where=path, remedy="give one row per wavelength: nm, value")
+    first = kept[0][1]
+    delimiter = max(";\t,", key=first.count)
+    return [(number, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]) for number, line in kept], lines
+
+
+def read_text(path: Path) -> str:
+    """A text file as UTF-8, byte-order mark dropped, with one clear line for what goes wrong."""
+    if not path.exists():
+        raise SpectrumError("no such file", where=path, remedy="check the path")
+    if path.is_dir():
+        raise SpectrumError("is a folder", where=path, remedy="name a file")
+    if path.stat().st_size > _LARGEST_FILE_BYTES:
+        raise SpectrumError("larger than 256 MB, too large for a table of spectra", where=path, remedy="is it the right file?")
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError:
+        raise SpectrumError("is not a text file", where=path, remedy="export the table as CSV in UTF-8") from None
+    except OSError as error:
+        raise SpectrumError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
+
+
+def _split_header(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[list[str] | None, list[tuple[int, list[str]]]]:
+    """A first row whose first cell is no number is the header."""
+    try:
+        float(rows[0][1][0])
+    except ValueError:
+        if len(rows) == 1:
+            raise SpectrumError("a header and no data", where=path, remedy="give one row per wavelength: nm, value") from None
+        return rows[0][1], rows[1:]
+    return None, rows
+
+
+def _numbers(path: Path, line: int, cells: list[str], width: int) -> list[float]:
+    if len(cells) != width:
+        raise SpectrumError(f"{len(cells)} columns, the rows before have {width}", where=_at(path, line), remedy="give every row the same columns")
+    numbers = []
+    for cell in cells:
+        try:
+            value = float(cell)
+        except ValueError:
+            what = "an empty cell" if not cell else f"'{cell[:40]}' is not a number"
+            raise SpectrumError(what, where=_at(path, line), remedy="use decimal points and no units in cells") from None
+        if not math.isfinite(value):
+            raise SpectrumError(f"'{cell}' is not a finite number", where=_at(path, line), remedy="measure, interpolate or drop that row")
+        numbers.append(value)
+    return numbers
+
+
+def _ascending(
+    path: Path, body: list[tuple[int, list[str]]], wavelengths: Float64Array, values: Float64Array
+) -> tuple[Float64Array, Float64Array]:
+    steps = np.diff(wavelengths)
+    if (steps > 0).all():
+        return wavelengths, values
+    if (steps < 0).all():
+        return wavelengths[::-1], values[:, ::-1]
+    if (steps == 0).any():
+        at = int(np.argmax(steps == 0)) + 1
+        raise SpectrumError(f"wavelength {wavelengths[at]:g} nm occurs twice", where=_at(path, body[at][0]), remedy="keep one row per wavelength")
+    rising = (steps > 0).sum() >= (steps < 0).sum()
+    at = int(np.argmax(steps < 0 if rising else steps > 0)) + 1
+    repeated = f"; {wavelengths[at]:g} nm occurs twice" if wavelengths[at] in wavelengths[:at] else ""
+    raise SpectrumError(
+        f"wavelength {wavelengths[at]:g} nm is out of order after {wavelengths[at - 1]:g} nm{repeated}",
+        where=_at(path, body[at][0]),
+        remedy="sort the rows by wavelength",
+    )
+
+
+def _check_wavelengths(path: Path, wavelengths: Float64Array, needs_curve: bool) -> None:
+    low, high = float(wavelengths[0]), float(wavelengths[-1])
+    for unit, factor in (("metres", 1e9), ("micrometres", 1e3)):
+        if low > 0 and _PLAUSIBLE_NM[0] <= low * factor and high * factor <= _PLAUSIBLE_NM[1] and high < 10:
+            raise SpectrumError(
+                f"wavelengths from {low:g} to {high:g} look like {unit}", where=path, remedy=f"multiply them by {factor:g} to give nanometres"
+            )
+    if low < _PLAUSIBLE_NM[0] or high > _PLAUSIBLE_NM[1]:
+        raise SpectrumError(f"wavelengths from {low:g} to {high:g} are not nanometres of light", where=path, remedy="give the first column in nm")
+    if high < _VISIBLE_NM[0] or low > _VISIBLE_NM[1]:
+        raise SpectrumError(f"wavelengths from {low:g} to {high:g} nm miss the visible range", where=path, remedy="give data between 380 and 780 nm")
+    if needs_curve and len(wavelengths) < 2:
+        raise SpectrumError("one wavelength only", where=path, remedy="give a table, or mark it '# kind: lines'")
+
+
+def _check_values(path: Path, wavelengths: Float64Array, values: Float64Array, quantity: Quantity) -> list[str]:
+    """Errors for values that cannot be, warnings for reflectances outside 0..1, which are kept."""
+    if quantity == "power":
+        return []
+    if values.max() > _LARGEST_REFLECTANCE:
+        raise SpectrumError(
+            f"reflectance up to {values.max():g}", where=path, remedy="divide percentages by 100, and counts by the white reference"
+        )
+    if values.min() < -0.5:
+        raise SpectrumError(f"reflectance down to {values.min():g}", where=path, remedy="correct the dark signal")
+    outside = ((values < 0) | (values > 1)).any(axis=0)
+    if not outside.any():
+        return []
+    return [f"reflectance from {values.min():g} to {values.max():g}, outside 0..1 at {int(outside.sum())} wavelengths; kept as measured"]
+
+
+def _at(path: Path, line: int) -> str:
+    return f"{path}, line {line}"

@@ -1,0 +1,193 @@
+"""The only door to colour-science: observers, CIE data, colour differences, light quality.
+
+colour-science takes about a second to import, so it is imported on first use, never when this
+module is.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from spectral_core.arrays import Float64Array, frozen
+from spectral_core.errors import LightError, SpectrumError
+
+OBSERVERS = {
+    "cie1931-2": "CIE 1931 2 Degree Standard Observer",
+    "cie1964-10": "CIE 1964 10 Degree Standard Observer",
+    "cie2015-2": "CIE 2015 2 Degree Standard Observer",
+    "cie2015-10": "CIE 2015 10 Degree Standard Observer",
+}
+DEFAULT_OBSERVER = "cie1931-2"
+
+
+@cache
+def _colour() -> ModuleType:
+    """Import colour-science quietly and leave no trace of a missing matplotlib.
+
+    Without matplotlib, colour-science puts mocks in ``sys.modules`` that break every other user
+    of the process (other Blender add-ons); they are taken out again.
+    """
+    had = {name for name in sys.modules if name.split(".")[0] == "matplotlib"}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import colour
+
+    for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
+        if name not in had and type(sys.modules[name]).__module__.startswith("unittest"):
+            del sys.modules[name]
+    return colour
+
+
+def colour_science_version() -> str:
+    """Version of the colour-science in use."""
+    return str(_colour().__version__)
+
+
+@cache
+def observer_table(observer: str = DEFAULT_OBSERVER) -> tuple[Float64Array, Float64Array]:
+    """Colour-matching functions at 1 nm: wavelengths (n,), values (n, 3).
+
+    Raises
+    ------
+    SpectrumError
+        If `observer` is none of `OBSERVERS`.
+    """
+    if observer not in OBSERVERS:
+        raise SpectrumError(f"no observer '{observer}'", remedy=f"use one of {', '.join(OBSERVERS)}")
+    cmfs = _colour().MSDS_CMFS[OBSERVERS[observer]]
+    return frozen(cmfs.wavelengths), frozen(cmfs.values)
+
+
+@cache
+def illuminant_tables() -> dict[str, tuple[Float64Array, Float64Array]]:
+    """CIE and ISO illuminants by name: wavelengths (n,) and relative power (n,)."""
+    return _tables(_colour().SDS_ILLUMINANTS)
+
+
+@cache
+def light_source_tables() -> dict[str, tuple[Float64Array, Float64Array]]:
+    """Measured light sources by name: wavelengths (n,) and relative power (n,)."""
+    return _tables(_colour().SDS_LIGHT_SOURCES)
+
+
+def published_chromaticities() -> dict[str, tuple[float, float]]:
+    """Published CIE 1931 xy of the illuminants, as colour-science tabulates them (CIE 015:2018)."""
+    table = _colour().CCS_ILLUMINANTS[OBSERVERS["cie1931-2"]]
+    names = set(illuminant_tables())
+    return {name: (float(xy[0]), float(xy[1])) for name, xy in table.items() if name in names}
+
+
+@cache
+def colorchecker(chart: str = "BabelColor Average") -> tuple[tuple[str, ...], Float64Array, Float64Array]:
+    """Reflectances of a ColorChecker: names (24,), wavelengths (n,), values (24, n)."""
+    sds = _colour().SDS_COLOURCHECKERS[chart]
+    names = tuple(sds)
+    wavelengths = sds[names[0]].wavelengths
+    return names, frozen(wavelengths), frozen([sds[name].values for name in names])
+
+
+def _tables(sds: Any) -> dict[str, tuple[Float64Array, Float64Array]]:
+    """Aliases of colour-science's lazy dictionaries are dropped: its own names are canonical."""
+    return {name: (frozen(sds[name].wavelengths), frozen(sds[name].values)) for name in list(sds)}
+
+
+@cache
+def srgb_to_XYZ_matrix() -> Float64Array:
+    """Linear sRGB (Rec.709 primaries, D65) to XYZ with white Y = 1: (3, 3), IEC 61966-2-1.
+
+    Derived from the primaries rather than taken rounded, so that its inverse is exact.
+    """
+    space = _colour().RGB_COLOURSPACES["sRGB"]
+    return frozen(_colour().normalised_primary_matrix(space.primaries, space.whitepoint))
+
+
+def XYZ_to_Lab(XYZ: Float64Array, white_XYZ: Float64Array) -> Float64Array:
+    """CIE 1976 L*a*b* (..., 3) of XYZ (..., 3) relative to the white's XYZ (3,).
+
+    Raises
+    ------
+    LightError
+        If the white has no power in one of its tristimulus values (Lab divides by them).
+    """
+    white = np.asarray(white_XYZ, dtype=np.float64)
+    if not np.all(white > 0):
+        raise LightError(f"Lab is undefined for the white XYZ {white.tolist()}", remedy="use a light with X, Y, Z > 0")
+    # colour-science takes the white as xy; scaled by its Y the result is the same.
+    xy = white[:2] / white.sum()
+    return np.asarray(_colour().XYZ_to_Lab(np.asarray(XYZ, dtype=np.float64) / white[1], xy), dtype=np.float64)
+
+
+def delta_E_2000(Lab_a: Float64Array, Lab_b: Float64Array) -> Float64Array:
+    """CIEDE2000 colour difference (...,) of two arrays of L*a*b* (..., 3); ISO/CIE 11664-6."""
+    return np.asarray(_colour().delta_E(Lab_a, Lab_b, method="CIE 2000"), dtype=np.float64)
+
+
+def cct_and_duv(xy: Float64Array) -> tuple[float, float]:
+    """Correlated colour temperature in kelvin and Duv of a CIE 1931 xy (2,), Ohno 2013."""
+    colour = _colour()
+    XYZ = np.array([xy[0] / xy[1], 1.0, (1 - xy[0] - xy[1]) / xy[1]])
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        cct, duv = colour.temperature.XYZ_to_CCT_Ohno2013(XYZ)
+    return float(cct), float(duv)
+
+
+def planckian_or_daylight_xy(cct_K: float) -> Float64Array:
+    """xy of the reference of a CCT: Planckian below 5000 K, CIE daylight from there on.
+
+    Raises
+    ------
+    LightError
+        Outside 1000 to 25000 K, where CIE daylight ends.
+    """
+    colour = _colour()
+    if not 1000 <= cct_K <= 25000:
+        raise LightError(f"CCT {cct_K:g} K is outside 1000 to 25000 K", remedy="give --xy instead")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if cct_K < 5000:
+            return np.asarray(colour.temperature.CCT_to_XYZ_Ohno2013([cct_K, 0.0]))[:2] / np.sum(
+                colour.temperature.CCT_to_XYZ_Ohno2013([cct_K, 0.0])
+            )
+        return np.asarray(colour.temperature.CCT_to_xy_CIE_D(cct_K))
+
+
+def fidelity_index(wavelengths_nm: Float64Array, powers: Float64Array) -> float:
+    """CIE 224:2017 colour fidelity index Rf of an evenly spaced SPD of at most 5 nm step.
+
+    NaN-free: raises LightError where the index is undefined (no power in the visible range).
+    """
+    colour = _colour()
+    sd = _distribution(wavelengths_nm, powers)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        value = float(colour.quality.colour_fidelity_index_CIE2017(sd))
+    return _finite(value, "Rf")
+
+
+def rendering_index(wavelengths_nm: Float64Array, powers: Float64Array) -> float:
+    """CIE 13.3-1995 general colour rendering index Ra of an evenly spaced SPD."""
+    colour = _colour()
+    sd = _distribution(wavelengths_nm, powers)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        value = float(colour.colour_rendering_index(sd))
+    return _finite(value, "Ra")
+
+
+def _distribution(wavelengths_nm: Float64Array, powers: Float64Array) -> Any:
+    return _colour().SpectralDistribution(
+        dict(zip(np.asarray(wavelengths_nm).tolist(), np.asarray(powers).tolist(), strict=True))
+    )
+
+
+def _finite(value: float, name: str) -> float:
+    if not np.isfinite(value):
+        raise LightError(f"{name} is undefined for this spectrum", remedy="give a spectrum with power from 380 to 780 nm")
+    return value
