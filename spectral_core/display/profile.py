@@ -1,0 +1,116 @@
+"""A display profile: a model with its name and provenance, kept as JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spectral_core.arrays import Float64Array
+from spectral_core.display.models import DisplayModel, GammaMatrix, SRGBCurve
+from spectral_core.errors import DisplayError
+from spectral_core.files import atomic_path
+
+_FORMAT = "spectral-booth display profile"
+_VERSION = 1
+
+
+@dataclass(frozen=True)
+class DisplayProfile:
+    """A display that can be asked for codes.
+
+    Attributes
+    ----------
+    name
+        What it is called.
+    model
+        Device codes to XYZ (white Y = 1) and back.
+    source
+        Where its numbers are from.
+    """
+
+    name: str
+    model: DisplayModel
+    source: str = ""
+
+    def to_XYZ(self, codes: Float64Array) -> Float64Array:
+        """XYZ (..., 3), white Y = 1, of device codes (..., 3) from 0 to 1."""
+        return self.model.forward(codes)
+
+    def to_codes(self, XYZ: Float64Array) -> Float64Array:
+        """Device codes (..., 3) of XYZ (..., 3), not clipped; outside 0..1 is out of gamut."""
+        return self.model.inverse(XYZ)
+
+    def to_linear(self, XYZ: Float64Array) -> Float64Array:
+        """Linear device RGB (..., 3) of XYZ (..., 3), not clipped."""
+        return self.model.linear(XYZ)
+
+
+def in_gamut(values: Float64Array, tolerance: float = 1e-6) -> np.ndarray:
+    """True (...,) where all channels of (..., 3) lie in 0..1; the tolerance is that of float32."""
+    return np.asarray(((values >= -tolerance) & (values <= 1 + tolerance)).all(axis=-1))
+
+
+def write_profile(profile: DisplayProfile, path: Path) -> None:
+    """Write a profile as JSON that `read_profile` gives back bit for bit."""
+    if not isinstance(profile.model, GammaMatrix):
+        raise DisplayError(f"'{profile.name}' is built in", remedy="name it instead of writing it")
+    model = profile.model
+    document = {
+        "format": _FORMAT,
+        "version": _VERSION,
+        "name": profile.name,
+        "source": profile.source,
+        "model": {
+            "type": "gamma-matrix",
+            "gamma": model.gamma.tolist(),
+            "matrix": model.matrix.tolist(),
+            "black_XYZ": model.black_XYZ.tolist(),
+        },
+    }
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+
+
+def read_profile(path: Path) -> DisplayProfile:
+    """Read a profile written by `write_profile`.
+
+    Raises
+    ------
+    DisplayError
+        If the file is missing, not JSON, or not such a profile.
+    """
+    document = _json(path)
+    if document.get("format") != _FORMAT or document.get("version") != _VERSION:
+        raise DisplayError("is not a display profile of this version", where=path, remedy=f"it must say format '{_FORMAT}', version {_VERSION}")
+    model = document.get("model")
+    if not isinstance(model, dict) or model.get("type") != "gamma-matrix":
+        raise DisplayError("has no model of type 'gamma-matrix'", where=path, remedy="characterise the display again")
+    try:
+        parameters = {key: np.asarray(model[key], dtype=np.float64) for key in ("gamma", "matrix", "black_XYZ")}
+    except KeyError as error:
+        raise DisplayError(f"the model lacks {error}", where=path, remedy="correct the profile") from None
+    except (TypeError, ValueError):
+        raise DisplayError("the model holds something that is no number", where=path, remedy="correct the profile") from None
+    try:
+        return DisplayProfile(str(document.get("name", path.stem)), GammaMatrix(**parameters), str(document.get("source", "")))
+    except DisplayError as error:
+        raise DisplayError(error.problem, where=path, remedy=error.remedy) from None
+
+
+def _json(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise DisplayError("no such file, and no built-in profile of that name", where=path, remedy="use sRGB, htc-vive-2021, htc-vive-2020 or a file")
+    try:
+        document = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError):
+        raise DisplayError("is not JSON", where=path, remedy="give a profile written by this program") from None
+    if not isinstance(document, dict):
+        raise DisplayError("is not a display profile", where=path, remedy="give a profile written by this program")
+    return document
+
+
+__all__ = ["DisplayProfile", "SRGBCurve", "in_gamut", "read_profile", "write_profile"]

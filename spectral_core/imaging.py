@@ -1,0 +1,77 @@
+"""Images on disk, through OpenImageIO."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+import numpy as np
+
+from spectral_core.arrays import Float32Array
+from spectral_core.errors import OutputError
+
+ImageFormat = Literal["exr", "png8", "png16", "tiff"]
+IMAGE_FORMATS: dict[str, tuple[str, str]] = {
+    "exr": (".exr", "half"),
+    "png8": (".png", "uint8"),
+    "png16": (".png", "uint16"),
+    "tiff": (".tif", "uint16"),
+}
+
+
+@cache
+def oiio() -> ModuleType:
+    """OpenImageIO; inside the bpy wheels it is bundled but not on the path."""
+    try:
+        import OpenImageIO
+    except ImportError:
+        bundled = _bundled_with_blender()
+        if bundled is None:
+            raise
+        sys.path.append(str(bundled))
+        import OpenImageIO
+    return OpenImageIO  # type: ignore[no-any-return]
+
+
+def _bundled_with_blender() -> Path | None:
+    """Site-packages that a loaded bpy brings; the core never imports bpy itself."""
+    bpy = sys.modules.get("bpy")
+    if bpy is None:
+        return None
+    version = f"python{sys.version_info.major}.{sys.version_info.minor}"
+    folder = Path(bpy.utils.resource_path("LOCAL")) / "python" / "lib" / version / "site-packages"
+    return folder if (folder / "OpenImageIO").exists() else None
+
+
+class ImageWriter:
+    """Writes an RGB image from the top down, a few rows at a time."""
+
+    def __init__(self, path: Path, width: int, height: int, image_format: ImageFormat) -> None:
+        self._path = path
+        _, pixel_type = IMAGE_FORMATS[image_format]
+        spec = oiio().ImageSpec(width, height, 3, pixel_type)
+        spec.attribute("oiio:ColorSpace", "Linear" if image_format == "exr" else "sRGB")
+        spec.attribute("compression", "zip")
+        self._row = 0
+        self._output: Any = oiio().ImageOutput.create(str(path))
+        if self._output is None or not self._output.open(str(path), spec):
+            raise OutputError(f"cannot be written ({self._error()})", where=path, remedy="choose another folder")
+
+    def write(self, rows: Float32Array) -> None:
+        """Append rows (count, width, 3), float32; integers are rounded from 0..1."""
+        count = len(rows)
+        if not self._output.write_scanlines(self._row, self._row + count, 0, np.ascontiguousarray(rows)):
+            raise OutputError(f"cannot be written ({self._error()})", where=self._path, remedy="is the disk full?")
+        self._row += count
+
+    def close(self) -> None:
+        """Finish the file."""
+        if not self._output.close():
+            raise OutputError(f"cannot be written ({self._error()})", where=self._path, remedy="is the disk full?")
+
+    def _error(self) -> str:
+        text = self._output.geterror() if self._output is not None else oiio().geterror()
+        return (text or "unknown").splitlines()[0]

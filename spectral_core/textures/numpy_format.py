@@ -1,0 +1,177 @@
+"""Textures in NumPy's own formats.
+
+``.npz`` holds ``reflectance`` (or ``radiance``), (height, width, bands), and ``wavelengths_nm``,
+(bands,). ``.npy`` holds the cube alone; its wavelengths stand in ``NAME.wavelengths.csv`` beside
+it, one a line, and it is reflectance. Integers are refused: a count is not a reflectance.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from pathlib import Path
+from typing import IO
+
+import numpy as np
+
+from spectral_core.arrays import Float32Array, frozen
+from spectral_core.errors import SpectrumError, TextureError
+from spectral_core.spectra import read_text
+from spectral_core.textures.base import HyperspectralTexture, Kind
+
+_LARGEST_SIDE = 1 << 20
+_LARGEST_BANDS = 10_000
+
+
+class NpyTexture(HyperspectralTexture):
+    """A memory-mapped ``.npy`` cube with its wavelengths in a file beside it."""
+
+    format = "npy"
+    kind: Kind = "reflectance"
+    scale = 1.0
+
+    def __init__(self, path: Path) -> None:
+        with path.open("rb") as stream:
+            shape, fortran, dtype = _header(stream, path)
+            offset = stream.tell()
+        _check_cube(shape, dtype, path)
+        _check_size(path.stat().st_size - offset, shape, dtype, path)
+        self._cube = np.memmap(path, dtype=dtype, mode="r", offset=offset, shape=shape, order="F" if fortran else "C")
+        self.name = path.stem
+        self.height, self.width, bands = shape
+        self.wavelengths_nm = frozen(_wavelengths_beside(path, bands))
+        self.warnings = ()
+
+    def rows(self, first: int, count: int) -> Float32Array:
+        """`count` rows from `first` on: (count, width, bands), float32."""
+        return np.ascontiguousarray(self._cube[first : first + count], dtype=np.float32)
+
+
+class NpzTexture(HyperspectralTexture):
+    """A ``.npz`` archive, compressed or not, streamed from its member without unpacking it whole."""
+
+    format = "npz"
+    scale = 1.0
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._next_row = 0
+        self._stream: IO[bytes] | None = None
+        try:
+            with zipfile.ZipFile(path) as archive:
+                members = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
+                self._member, self.kind = _cube_member(members, path)
+                self._shape, fortran, self._dtype = self._read_header(archive, members[self._member])
+                _check_cube(self._shape, self._dtype, path)
+                if fortran:
+                    raise TextureError("the cube is in Fortran order, which cannot be streamed", where=path, remedy="save numpy.ascontiguousarray of it")
+                wavelengths = _small_array(archive, members, path)
+        except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError) as error:
+            raise TextureError(f"is a damaged archive ({error})", where=path, remedy="write it again") from None
+        self.name = path.stem
+        self.height, self.width, bands = self._shape
+        self.wavelengths_nm = frozen(_checked_wavelengths(wavelengths, bands, path))
+        self.warnings = ()
+
+    def _read_header(self, archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int, ...], bool, np.dtype]:
+        with archive.open(info) as stream:
+            shape, fortran, dtype = _header(stream, self._path)
+            _check_cube(shape, dtype, self._path)
+            _check_size(info.file_size - stream.tell(), shape, dtype, self._path)
+        return shape, fortran, dtype
+
+    def rows(self, first: int, count: int) -> Float32Array:
+        """`count` rows from `first` on: (count, width, bands), float32. Fast from the top down."""
+        row_bytes = self.width * self.bands * self._dtype.itemsize
+        try:
+            if self._stream is None or first < self._next_row:
+                self.close()
+                self._stream = zipfile.ZipFile(self._path).open(f"{self._member}.npy")
+                _header(self._stream, self._path)
+                self._next_row = 0
+            self._stream.seek((first - self._next_row) * row_bytes, 1)
+            data = self._stream.read(count * row_bytes)
+        except (zipfile.BadZipFile, EOFError, OSError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+            raise TextureError(f"is a damaged archive ({error})", where=self._path, remedy="write it again") from None
+        if len(data) < count * row_bytes:
+            raise TextureError(f"ends in row {first + len(data) // row_bytes}", where=self._path, remedy="write it again")
+        self._next_row = first + count
+        return np.frombuffer(data, dtype=self._dtype).reshape(count, self.width, self.bands).astype(np.float32)
+
+    def close(self) -> None:
+        """Close the archive; the next read opens it again."""
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None
+
+
+def _header(stream: IO[bytes], path: Path) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Shape, order and type of an array file, without evaluating or allocating anything of it."""
+    try:
+        version = np.lib.format.read_magic(stream)
+        if version == (1, 0):
+            return np.lib.format.read_array_header_1_0(stream)
+        return np.lib.format.read_array_header_2_0(stream)
+    except (ValueError, EOFError) as error:
+        raise TextureError(f"has a damaged NumPy header ({str(error).splitlines()[0]})", where=path, remedy="write it again") from None
+
+
+def _check_cube(shape: tuple[int, ...], dtype: np.dtype, path: Path) -> None:
+    if len(shape) != 3 or not all(0 < side <= _LARGEST_SIDE for side in shape) or shape[2] > _LARGEST_BANDS:
+        raise TextureError(f"holds an array of shape {shape}", where=path, remedy="give (height, width, bands)")
+    if dtype.hasobject or dtype.kind != "f":
+        raise TextureError(f"holds values of type {dtype}, not floating point", where=path, remedy="divide counts by the white reference and save float32")
+
+
+def _check_size(available: int, shape: tuple[int, ...], dtype: np.dtype, path: Path) -> None:
+    promised = math.prod(shape) * dtype.itemsize
+    if available < promised:
+        raise TextureError(
+            f"the header promises {promised:,} bytes for {shape}, the file holds {max(available, 0):,}", where=path, remedy="the file is cut short; copy or write it again"
+        )
+
+
+def _cube_member(members: dict[str, zipfile.ZipInfo], path: Path) -> tuple[str, Kind]:
+    kinds: tuple[Kind, ...] = ("reflectance", "radiance")
+    for kind in kinds:
+        if kind in members:
+            return kind, kind
+    raise TextureError(
+        f"holds {', '.join(sorted(members)[:6]) or 'nothing'}", where=path, remedy="save it as numpy.savez(file, reflectance=..., wavelengths_nm=...)"
+    )
+
+
+def _small_array(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], path: Path) -> np.ndarray:
+    info = members.get("wavelengths_nm")
+    if info is None:
+        raise TextureError("lacks the array 'wavelengths_nm'", where=path, remedy="save one wavelength in nm per band")
+    if info.file_size > 8 * _LARGEST_BANDS + 4096:
+        raise TextureError("'wavelengths_nm' is far too large", where=path, remedy="save one wavelength in nm per band")
+    with archive.open(info) as stream:
+        try:
+            return np.asarray(np.lib.format.read_array(stream, allow_pickle=False), dtype=np.float64)
+        except (ValueError, TypeError) as error:
+            raise TextureError(f"'wavelengths_nm' cannot be read ({str(error).splitlines()[0]})", where=path, remedy="save plain numbers") from None
+
+
+def _wavelengths_beside(path: Path, bands: int) -> np.ndarray:
+    beside = path.with_name(f"{path.stem}.wavelengths.csv")
+    if not beside.is_file():
+        raise TextureError("an .npy file does not say its wavelengths", where=path, remedy=f"write {beside.name} beside it, one wavelength in nm a line, or save .npz")
+    try:
+        values = [float(line) for line in read_text(beside).splitlines() if line.strip() and not line.startswith("#")]
+    except ValueError as error:
+        raise TextureError(f"holds something that is no number ({error})", where=beside, remedy="give one wavelength in nm a line") from None
+    except SpectrumError as error:
+        raise TextureError(error.problem, where=beside, remedy=error.remedy) from None
+    return _checked_wavelengths(np.array(values), bands, beside)
+
+
+def _checked_wavelengths(wavelengths: np.ndarray, bands: int, path: Path) -> np.ndarray:
+    if wavelengths.shape != (bands,):
+        raise TextureError(f"{wavelengths.size} wavelengths for {bands} bands", where=path, remedy="give one wavelength per band")
+    if not np.isfinite(wavelengths).all() or wavelengths.min() < 100 or wavelengths.max() > 5000:
+        raise TextureError("the wavelengths are not nanometres of light", where=path, remedy="give them in nm")
+    if len(np.unique(wavelengths)) < bands:
+        raise TextureError("a wavelength occurs twice", where=path, remedy="average or drop one of the two bands")
+    return wavelengths

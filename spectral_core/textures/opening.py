@@ -1,0 +1,39 @@
+"""`open_texture`: the format is known from the file's own first bytes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from spectral_core.errors import TextureError
+from spectral_core.textures.base import HyperspectralTexture
+from spectral_core.textures.numpy_format import NpyTexture, NpzTexture
+from spectral_core.textures.spectral_exr import SpectralExrTexture
+
+_FORMATS = (
+    (b"\x93NUMPY", NpyTexture),
+    (b"PK\x03\x04", NpzTexture),
+    (b"\x76\x2f\x31\x01", SpectralExrTexture),
+)
+
+
+def open_texture(path: str | Path) -> HyperspectralTexture:
+    """Open a hyperspectral texture: ``.npy`` with its wavelengths beside it, ``.npz``, spectral OpenEXR.
+
+    Raises
+    ------
+    TextureError
+        If the file is missing, of an unknown format, damaged, or not a texture of spectra.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise TextureError("no such file" if not path.exists() else "is a folder", where=path, remedy="name a texture file")
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(8)
+    except OSError as error:
+        raise TextureError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
+    for signature, texture in _FORMATS:
+        if head.startswith(signature):
+            return texture(path)
+    what = "is empty" if not head else "is no texture of a known format"
+    raise TextureError(what, where=path, remedy="give .npy, .npz or spectral OpenEXR")
