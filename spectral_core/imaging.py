@@ -11,7 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from spectral_core.arrays import Float32Array
+from spectral_core.display.models import srgb_encode
 from spectral_core.errors import OutputError
+from spectral_core.files import atomic_path
 
 ImageFormat = Literal["exr", "png8", "png16", "tiff"]
 IMAGE_FORMATS: dict[str, tuple[str, str]] = {
@@ -75,3 +77,12 @@ class ImageWriter:
     def _error(self) -> str:
         text = self._output.geterror() if self._output is not None else oiio().geterror()
         return (text or "unknown").splitlines()[0]
+
+
+def write_png(path: Path, linear: Float32Array) -> None:
+    """Write linear sRGB (height, width, 3) as an 8-bit sRGB PNG, clipped, as a screen shows it."""
+    height, width, _ = linear.shape
+    with atomic_path(path) as temporary:
+        writer = ImageWriter(temporary, width, height, "png8")
+        writer.write(np.asarray(srgb_encode(np.clip(linear, 0.0, 1.0)), dtype=np.float32))
+        writer.close()

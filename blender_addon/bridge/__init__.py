@@ -1,0 +1,1 @@
+"""The only access to ``bpy.data``: arrays and descriptions become images, materials, lamps, meshes."""

@@ -1,0 +1,151 @@
+"""Read surfaces off a render: which pixels show which object, and how much light falls there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from . import materials, state
+from .render import render_linear
+from spectral_core.arrays import Float32Array, Float64Array
+
+# The reconstruction filter is 1.5 pixels wide: two pixels from an edge nothing else is mixed in.
+_BORDER_PIXELS = 2
+
+
+@dataclass(frozen=True)
+class Identity:
+    """Which object and which point of its texture each pixel shows.
+
+    Attributes
+    ----------
+    masks
+        Pixels (height, width) wholly inside each managed object, by object name.
+    uv
+        (height, width, 2) texture coordinates, v up.
+    """
+
+    masks: dict[str, np.ndarray]
+    uv: Float32Array
+
+
+@dataclass(frozen=True)
+class Illumination:
+    """Light on each pixel's surface (height, width), by an all-white render under neutral lamps.
+
+    Attributes
+    ----------
+    irradiance
+        Relative to that which gives the perfect diffuser its luminance.
+    gloss
+        Light that neutral gloss adds, in the same unit.
+    """
+
+    irradiance: Float32Array
+    gloss: Float32Array
+
+
+def identify(scene: bpy.types.Scene) -> Identity:
+    """Render which object each pixel shows."""
+    items = list(state.managed_objects(scene))
+    with _flat_override(scene):
+        for index, item in enumerate(items):
+            item.pass_index = index + 1
+        pixels = render_linear(scene).pixels
+    numbers = np.round(pixels[..., 2]).astype(int)
+    masks = {item.name: _eroded(numbers == index + 1) for index, item in enumerate(items)}
+    return Identity(masks, pixels[..., :2])
+
+
+def illumination(scene: bpy.types.Scene) -> Illumination:
+    """Render the irradiance, and the gloss if the scene has some."""
+    with _neutral(scene, 1.0):
+        white = render_linear(scene).pixels[..., 1]
+    if not any(materials.has_gloss(item) for item in state.managed_materials(scene).values()):
+        return Illumination(white, np.zeros_like(white))
+    with _neutral(scene, 0.0):
+        gloss = render_linear(scene).pixels[..., 1]
+    return Illumination(white - gloss, gloss)
+
+
+def sample(image: Float64Array, uv: Float32Array) -> Float64Array:
+    """Bilinear samples (n, 3) of an image (height, width, 3) from the top, at uv (n, 2), repeating:
+    texel centres lie at half texels, as on a GPU."""
+    height, width, _ = image.shape
+    x = uv[:, 0].astype(np.float64) * width - 0.5
+    y = (1.0 - uv[:, 1].astype(np.float64)) * height - 0.5
+    left, top = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = (x - left)[:, None], (y - top)[:, None]
+    columns, rows = (left % width, (left + 1) % width), (top % height, (top + 1) % height)
+    upper = image[rows[0], columns[0]] * (1 - fx) + image[rows[0], columns[1]] * fx
+    lower = image[rows[1], columns[0]] * (1 - fx) + image[rows[1], columns[1]] * fx
+    return np.asarray(upper * (1 - fy) + lower * fy)
+
+
+@contextmanager
+def _neutral(scene: bpy.types.Scene, value: float) -> Iterator[None]:
+    """All surfaces of one grey, all lamps of unit colour; restored afterwards."""
+    colours = [(lamp.data, tuple(lamp.data.color)) for lamp in state.managed_lamps(scene)]
+    managed = list(state.managed_materials(scene).values())
+    for data, _ in colours:
+        data.color = (1.0, 1.0, 1.0)
+    for material in managed:
+        materials.set_uniform(material, value)
+    try:
+        yield
+    finally:
+        for data, colour in colours:
+            data.color = colour
+        for material in managed:
+            materials.set_uniform(material, None)
+
+
+@contextmanager
+def _flat_override(scene: bpy.types.Scene) -> Iterator[None]:
+    """Every surface emits (u, v, object number), one unfiltered sample a pixel."""
+    material = _identity_material()
+    layer = scene.view_layers[0]
+    kept = (layer.material_override, scene.eevee.taa_render_samples, scene.render.filter_size)
+    layer.material_override = material
+    scene.eevee.taa_render_samples, scene.render.filter_size = 1, 0.0
+    try:
+        yield
+    finally:
+        layer.material_override, scene.eevee.taa_render_samples, scene.render.filter_size = kept
+        bpy.data.materials.remove(material)
+
+
+def _identity_material() -> bpy.types.Material:
+    material = bpy.data.materials.new("Spectral Booth identity")
+    if bpy.app.version < (5, 0, 0):
+        material.use_nodes = True
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    nodes.clear()
+    coordinates = nodes.new("ShaderNodeTexCoord")
+    split = nodes.new("ShaderNodeSeparateXYZ")
+    links.new(coordinates.outputs["UV"], split.inputs[0])
+    number = nodes.new("ShaderNodeObjectInfo")
+    colour = nodes.new("ShaderNodeCombineColor")
+    links.new(split.outputs[0], colour.inputs[0])
+    links.new(split.outputs[1], colour.inputs[1])
+    links.new(number.outputs["Object Index"], colour.inputs[2])
+    emission = nodes.new("ShaderNodeEmission")
+    links.new(colour.outputs[0], emission.inputs["Color"])
+    output = nodes.new("ShaderNodeOutputMaterial")
+    links.new(emission.outputs[0], output.inputs["Surface"])
+    return material
+
+
+def _eroded(mask: np.ndarray) -> np.ndarray:
+    """The mask without its border, image edges included."""
+    padded = np.pad(mask, _BORDER_PIXELS)
+    result = mask.copy()
+    height, width = mask.shape
+    for dy in range(2 * _BORDER_PIXELS + 1):
+        for dx in range(2 * _BORDER_PIXELS + 1):
+            result &= padded[dy : dy + height, dx : dx + width]
+    return result

@@ -1,0 +1,172 @@
+"""Render a managed scene under its lights and levels, and compare the pixels with theory."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from spectral_core.arrays import Float32Array, Float64Array
+from spectral_core.bake import file_name
+from spectral_core.imaging import write_png
+from spectral_core.lighting import Lighting
+from spectral_core.scene import LEVELS, SceneDescription
+from spectral_core.surfaces import Surface, scene_surfaces
+from spectral_core.verification import (
+    LevelResult,
+    LightResult,
+    PatchReading,
+    Spread,
+    compare,
+    conditions,
+    pixel_differences,
+)
+
+from . import lighting, materials, measure, state
+from .render import render_linear
+
+# Fewer pixels than this are no reading: 5 x 5 inside the border.
+_FEWEST_PIXELS = 25
+# Pixels of a textured object whose colour in the identity pass and in the filtered render belong
+# together: the texture must vary slowly across the 1.5-pixel filter, which it does not at grazing
+# angles, where irradiance is small.
+_LEAST_IRRADIANCE = 0.2
+
+Progress = Callable[[float, str], None]
+
+
+def verify(
+    scene: bpy.types.Scene,
+    lights: Sequence[str],
+    levels: Sequence[int] = LEVELS,
+    images: Path | None = None,
+    progress: Progress | None = None,
+) -> list[LightResult]:
+    """Verify a scene under `lights` at `levels`; it is left as it was found.
+
+    The ColorChecker's patches are what is counted where the scene has one, as published; without
+    one, every uniform surface. With `images`, each render is kept there as PNG.
+    """
+    description = state.description(scene)
+    before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
+    identity = measure.identify(scene)
+    illumination = _illumination(scene, description, identity)
+    results = []
+    try:
+        for index, light in enumerate(lights):
+            found: dict[int, LevelResult] = {}
+            textures: dict[str, Spread] = {}
+            for level in levels:
+                if progress:
+                    progress((index + levels.index(level) / len(levels)) / len(lights), f"{light}, level {level}")
+                started = time.perf_counter()
+                applied = lighting.apply(scene, light, level)
+                switched = time.perf_counter() - started
+                rendered = render_linear(scene)
+                if images:
+                    write_png(images / f"{file_name(light)}_level{level}.png", rendered.pixels)
+                diffuse = rendered.pixels - illumination.gloss[..., None] * applied.lighting.lamp_rgb.astype(np.float32)
+                readings = _read_patches(scene, description, applied.lighting, diffuse, identity, illumination)
+                found[level] = compare(readings, applied.lighting, switched, rendered.seconds)
+                if level == max(levels):
+                    met = conditions(applied.lighting, applied.clipped, applied.extended)
+                    textures = _read_textures(scene, description, applied.lighting, diffuse, identity, illumination)
+            results.append(LightResult(light, found, textures, met))
+    finally:
+        lighting.apply(scene, *before)
+    return results
+
+
+def left_out(scene: bpy.types.Scene) -> list[str]:
+    """What the scene does without because it does not need it."""
+    description = state.description(scene)
+    surfaces = scene_surfaces(description)
+    uniform = sum(surface.uniform for surface in surfaces.values())
+    textured = [surface for surface in surfaces.values() if surface.texture is not None]
+    megabytes = sum(each.texture.width * each.texture.height for each in textured if each.texture) * 16 / 1e6
+    lines = [f"images for {uniform} uniform surfaces: each is one constant"]
+    if textured:
+        others = len(description.lights) - 1
+        lines.append(
+            f"images for the {others} lights not shown: {others * megabytes:.0f} MB; a switch computes the "
+            f"{len(textured)} that are needed ({megabytes:.0f} MB)"
+        )
+    return lines
+
+
+def _illumination(
+    scene: bpy.types.Scene, description: SceneDescription, identity: measure.Identity
+) -> measure.Illumination:
+    """By theory where one sun lights flat surfaces; otherwise from an all-white render."""
+    items = [item for item in state.managed_objects(scene) if identity.masks[item.name].sum() >= _FEWEST_PIXELS]
+    flat = all(len(item.data.polygons) == 1 for item in items if _is_patch(item)) and any(map(_is_patch, items))
+    if not (description.single_sun and flat):
+        return measure.illumination(scene)
+    sun = next(state.managed_lamps(scene))
+    towards = sun.matrix_world.to_3x3().col[2].normalized()
+    irradiance = np.zeros(identity.uv.shape[:2], dtype=np.float32)
+    for item in items:
+        normal = (item.matrix_world.to_3x3() @ item.data.polygons[0].normal).normalized()
+        irradiance[identity.masks[item.name]] = sun.data.energy / math.pi * max(0.0, normal.dot(towards))
+    return measure.Illumination(irradiance, np.zeros_like(irradiance))
+
+
+def _is_patch(item: bpy.types.Object) -> bool:
+    return state.surface_name(item).startswith("colorchecker ") and len(item.data.polygons) == 1
+
+
+def _read_patches(
+    scene: bpy.types.Scene,
+    description: SceneDescription,
+    applied: Lighting,
+    rendered: Float32Array,
+    identity: measure.Identity,
+    illumination: measure.Illumination,
+) -> list[PatchReading]:
+    surfaces = scene_surfaces(description)
+    shown = state.managed_materials(scene)
+    uniform = [item for item in state.managed_objects(scene) if surfaces[state.surface_name(item)].uniform]
+    readings = []
+    for item in [each for each in uniform if _is_patch(each)] or uniform:
+        mask = identity.masks[item.name]
+        if mask.sum() < _FEWEST_PIXELS:
+            continue
+        name = state.surface_name(item)
+        readings.append(
+            PatchReading(
+                name=item.name,
+                surface=name,
+                rendered=rendered[mask].mean(axis=0, dtype=np.float64),
+                irradiance=float(illumination.irradiance[mask].mean(dtype=np.float64)),
+                stored=materials.stored_colour(shown[name]),
+                exact=applied.exact_rgb(surfaces[name]),
+            )
+        )
+    return readings
+
+
+def _read_textures(
+    scene: bpy.types.Scene,
+    description: SceneDescription,
+    applied: Lighting,
+    rendered: Float32Array,
+    identity: measure.Identity,
+    illumination: measure.Illumination,
+) -> dict[str, Spread]:
+    """Per textured object, its pixels against the texture's exact colours at the same points."""
+    surfaces = scene_surfaces(description)
+    found = {}
+    for item in state.managed_objects(scene):
+        surface: Surface = surfaces[state.surface_name(item)]
+        mask = identity.masks[item.name] & (illumination.irradiance > _LEAST_IRRADIANCE)
+        if surface.uniform or mask.sum() < _FEWEST_PIXELS:
+            continue
+        exact: Float64Array = measure.sample(applied.exact_rgb(surface), identity.uv[mask])
+        found[item.name] = pixel_differences(
+            rendered[mask].astype(np.float64), exact * illumination.irradiance[mask][:, None]
+        )
+    return found

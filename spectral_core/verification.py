@@ -1,0 +1,200 @@
+"""Rendered pixels against theory: 8-bit differences per channel, dE00, and the error by stage."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from spectral_core.arrays import Float64Array
+from spectral_core.display import srgb, srgb_encode
+from spectral_core.display.profile import in_gamut
+from spectral_core.lighting import WORKING_SPACE, Lighting
+from spectral_core.standards import XYZ_to_Lab, delta_E_2000
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Mean, standard deviation and maximum of absolute differences."""
+
+    mean: float
+    sd: float
+    max: float
+
+
+@dataclass(frozen=True)
+class Percentiles:
+    """Mean, 95th percentile and maximum."""
+
+    mean: float
+    p95: float
+    max: float
+
+
+@dataclass(frozen=True)
+class PatchReading:
+    """What a render shows of one surface, averaged over its pixels.
+
+    Attributes
+    ----------
+    name, surface
+        The object and its surface.
+    rendered
+        (3,) linear RGB in the render.
+    irradiance
+        Relative to that which gives the perfect diffuser its luminance.
+    stored
+        (3,) linear RGB the material holds, in the precision it is stored in.
+    exact
+        (3,) linear RGB of theory at irradiance 1, float64, from the spectra.
+    """
+
+    name: str
+    surface: str
+    rendered: Float64Array
+    irradiance: float
+    stored: Float64Array
+    exact: Float64Array
+
+
+@dataclass(frozen=True)
+class LevelResult:
+    """One light at one level against theory.
+
+    Attributes
+    ----------
+    rgb8
+        Per channel, in 8-bit sRGB levels before rounding, all patches clipped to 0..1 on both sides.
+    rgb8_in_gamut
+        The same over the patches whose exact colour needs no clipping.
+    dE00
+        CIEDE2000 against the exact colour, not clipped, relative to the white under the light.
+    dE00_in_gamut
+        The same over the patches in gamut.
+    stages
+        8-bit levels (mean and max over patches and channels) lost by each stage.
+    """
+
+    rgb8: dict[str, Spread]
+    rgb8_in_gamut: dict[str, Spread]
+    dE00: Percentiles
+    dE00_in_gamut: Percentiles
+    stages: dict[str, Spread]
+    patches: int
+    in_gamut: int
+    switch_seconds: float
+    render_seconds: float
+
+
+def compare(readings: list[PatchReading], lighting: Lighting, switch_seconds: float = 0.0, render_seconds: float = 0.0) -> LevelResult:
+    """Compare readings with theory for one lighting (any level; theory is always the exact colour)."""
+    irradiance = np.array([reading.irradiance for reading in readings])[:, None]
+    rendered = np.array([reading.rendered for reading in readings])
+    exact = np.array([reading.exact for reading in readings]) * irradiance
+    stored = np.array([reading.stored for reading in readings]) * irradiance * lighting.lamp_rgb
+    inside = in_gamut(exact)
+    difference = np.abs(_codes(rendered) - _codes(exact))
+    dE00 = _dE00(rendered, exact, lighting)
+    return LevelResult(
+        rgb8=_per_channel(difference),
+        rgb8_in_gamut=_per_channel(difference[inside]),
+        dE00=percentiles(dE00),
+        dE00_in_gamut=percentiles(dE00[inside]),
+        stages={
+            "8-bit rounding": _spread(np.abs(_codes(exact) - np.round(_codes(exact)))),
+            "material": _spread(np.abs(_codes(stored) - _codes(exact))),
+            "Eevee": _spread(np.abs(_codes(rendered) - _codes(stored))),
+        },
+        patches=len(readings),
+        in_gamut=int(inside.sum()),
+        switch_seconds=switch_seconds,
+        render_seconds=render_seconds,
+    )
+
+
+def percentiles(values: Float64Array) -> Percentiles:
+    """Mean, 95th percentile and maximum of (n,); zeros for none."""
+    if not len(values):
+        return Percentiles(0.0, 0.0, 0.0)
+    return Percentiles(float(values.mean()), float(np.percentile(values, 95)), float(values.max()))
+
+
+@dataclass(frozen=True)
+class LightResult:
+    """One light at all levels that were verified.
+
+    Attributes
+    ----------
+    levels
+        By level, 0 to 2.
+    textures
+        Per textured object at level 2: 8-bit differences over its single pixels.
+    conditions
+        What made this light numerically special, one sentence each.
+    """
+
+    name: str
+    levels: dict[int, LevelResult]
+    textures: dict[str, Spread]
+    conditions: tuple[str, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """The light's entry in the contract's JSON."""
+        levels = {f"level{level}": asdict(result) for level, result in self.levels.items()}
+        textures = {name: asdict(spread) for name, spread in self.textures.items()}
+        return {"name": self.name, **levels, "textures": textures, "conditions": list(self.conditions)}
+
+
+def pixel_differences(rendered: Float64Array, exact: Float64Array) -> Spread:
+    """8-bit differences of pixels (n, 3) of linear RGB, clipped to 0..1 on both sides."""
+    return _spread(np.abs(_codes(rendered) - _codes(exact)))
+
+
+def conditions(lighting: Lighting, clipped: dict[str, int], extended: dict[str, float]) -> tuple[str, ...]:
+    """The numerical conditions a lighting met: lines, folding, negative channels, extended ends."""
+    found = list(lighting.notes) + list(lighting.light.warnings)
+    if lighting.light.lines.any():
+        lines = ", ".join(f"{each:.2f}" for each in lighting.light.wavelengths_nm[lighting.light.lines])
+        found.append(f"spectral lines at {lines} nm, summed at their exact wavelengths")
+    negative = [name for name, count in clipped.items() if count]
+    if negative:
+        found.append(f"outside {WORKING_SPACE}, negative channels shown as 0: {', '.join(negative)}")
+    worst = max(extended.values(), default=0.0)
+    if worst > 0:
+        found.append(f"ends of reflectances repeated beyond their bands: {worst:.3%} of the white's X, Y or Z at most")
+    return tuple(found)
+
+
+def worst_stages(lights: list[LightResult], level: int = 2) -> dict[str, Any]:
+    """Per stage, the mean over the lights and the largest maximum at a level."""
+    results = [light.levels[level] for light in lights if level in light.levels]
+    names = results[0].stages if results else {}
+    return {
+        name: {
+            "mean": float(np.mean([each.stages[name].mean for each in results])),
+            "max": max(each.stages[name].max for each in results),
+        }
+        for name in names
+    }
+
+
+def _codes(linear: Float64Array) -> Float64Array:
+    """8-bit sRGB levels before rounding, clipped as a screen does."""
+    return np.asarray(255 * srgb_encode(np.clip(linear, 0.0, 1.0)))
+
+
+def _dE00(rendered: Float64Array, exact: Float64Array, lighting: Lighting) -> Float64Array:
+    white = lighting.light.XYZ() * lighting.luminance
+    matrix = np.linalg.inv(srgb().to_linear(np.eye(3)).T)
+    return delta_E_2000(XYZ_to_Lab(rendered @ matrix.T, white), XYZ_to_Lab(exact @ matrix.T, white))
+
+
+def _per_channel(difference: Float64Array) -> dict[str, Spread]:
+    return {channel: _spread(difference[:, index]) for index, channel in enumerate("RGB")}
+
+
+def _spread(values: Float64Array) -> Spread:
+    if not values.size:
+        return Spread(0.0, 0.0, 0.0)
+    return Spread(float(values.mean()), float(values.std()), float(values.max()))
