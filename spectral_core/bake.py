@@ -50,9 +50,13 @@ class BakeResult:
     repaired: int = 0
 
 
-def level2_weights(texture: HyperspectralTexture, lights: Sequence[Light], observer: str = DEFAULT_OBSERVER) -> Float64Array:
+def level2_weights(
+    texture: HyperspectralTexture, lights: Sequence[Light], observer: str = DEFAULT_OBSERVER
+) -> Float64Array:
     """Weighting factors of all lights side by side: (bands, 3 * lights)."""
-    return np.concatenate([light.weighting_factors(texture.wavelengths_nm, observer).matrix for light in lights], axis=1)
+    return np.concatenate(
+        [light.weighting_factors(texture.wavelengths_nm, observer).matrix for light in lights], axis=1
+    )
 
 
 def project(texture: HyperspectralTexture, weights: Float64Array) -> Iterator[tuple[int, Float32Array]]:
@@ -72,7 +76,9 @@ def project(texture: HyperspectralTexture, weights: Float64Array) -> Iterator[tu
         values = (tile.values.reshape(-1, bands) @ factors).reshape(rows, width, -1)
         if not np.isfinite(values).all():
             row = tile.first_row + int(np.argmax(~np.isfinite(values).all(axis=(1, 2))))
-            raise TextureError(f"'{texture.name}' has a value that is no finite number in row {row}", remedy="repair the capture")
+            raise TextureError(
+                f"'{texture.name}' has a value that is no finite number in row {row}", remedy="repair the capture"
+            )
         yield tile.first_row, values
 
 
@@ -105,7 +111,10 @@ def bake(
         If an image cannot be written.
     """
     if texture.kind != "reflectance":
-        raise TextureError(f"'{texture.name}' holds {texture.kind}, which is already lit", remedy="divide it by the radiance of a white reference")
+        raise TextureError(
+            f"'{texture.name}' holds {texture.kind}, which is already lit",
+            remedy="divide it by the radiance of a white reference",
+        )
     profile = profile or srgb()
     reference = reference or Light.builtin("D65")
     weights = level2_weights(texture, [*lights, reference] if 1 in levels else lights, observer)
@@ -123,7 +132,9 @@ def bake(
                 mark = time.perf_counter()
                 linear = np.asarray(profile.to_linear(XYZ.reshape(*XYZ.shape[:2], -1, 3)), dtype=np.float32)
                 for number, (level, index) in enumerate(jobs):
-                    pixels = linear[:, :, index] if level == 2 else linear[:, :, -1] * lamp_colours[index].astype(np.float32)
+                    pixels = (
+                        linear[:, :, index] if level == 2 else linear[:, :, -1] * lamp_colours[index].astype(np.float32)
+                    )
                     clipped[number] += _outside(pixels)
                     writers[number].write(_encode(pixels, profile, image_format))
                 seconds["write"] += time.perf_counter() - mark
@@ -161,7 +172,10 @@ def _image_paths(
     name: str, lights: Sequence[Light], jobs: Sequence[tuple[int, int]], folder: Path, image_format: str
 ) -> list[Path]:
     suffix, _ = IMAGE_FORMATS[image_format]
-    paths = [folder / f"{name}_{file_name(lights[index].name)}{'' if level == 2 else '_level1'}{suffix}" for level, index in jobs]
+    paths = [
+        folder / f"{name}_{file_name(lights[index].name)}{'' if level == 2 else '_level1'}{suffix}"
+        for level, index in jobs
+    ]
     if len(set(paths)) < len(paths):
         raise OutputError("two lights would be written to one file", where=folder, remedy="give each light once")
     return paths

@@ -32,7 +32,9 @@ def chart_objects(chart: SceneObject) -> list[SceneObject]:
     objects = [replace(chart, shape="box")]
     for index, name in enumerate(standards.colorchecker()[0]):
         row, column = divmod(index, COLUMNS)
-        offset = np.array([(column - (COLUMNS - 1) / 2) * pitch, ((ROWS - 1) / 2 - row) * pitch, thickness * (1 + _LIFT)])
+        offset = np.array(
+            [(column - (COLUMNS - 1) / 2) * pitch, ((ROWS - 1) / 2 - row) * pitch, thickness * (1 + _LIFT)]
+        )
         x, y, z = np.asarray(chart.location) + turn @ offset
         patch = replace(
             chart,

@@ -26,7 +26,9 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
         os.close(handle)
     except OSError as error:
-        raise OutputError(f"cannot be written ({error.strerror})", where=target, remedy="choose another folder") from None
+        raise OutputError(
+            f"cannot be written ({error.strerror})", where=target, remedy="choose another folder"
+        ) from None
     temporary = Path(name)
     try:
         yield temporary

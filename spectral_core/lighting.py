@@ -70,8 +70,14 @@ def make_lighting(light: Light, level: int, luminance: float) -> Lighting:
     notes: list[str] = []
     folded = level == 2 and bool(light_rgb.min() < SMALLEST_CHANNEL_SHARE * light_rgb.max())
     if folded:
-        channels = ", ".join(name for name, value in zip(("red", "green", "blue"), light_rgb, strict=True) if value < SMALLEST_CHANNEL_SHARE * light_rgb.max())
-        notes.append(f"{light.name} has too little {channels} in {WORKING_SPACE} for a lamp: neutral lamps, the light is in the materials")
+        channels = ", ".join(
+            name
+            for name, value in zip(("red", "green", "blue"), light_rgb, strict=True)
+            if value < SMALLEST_CHANNEL_SHARE * light_rgb.max()
+        )
+        notes.append(
+            f"{light.name} has too little {channels} in {WORKING_SPACE} for a lamp: neutral lamps, the light is in the materials"
+        )
     if level == 1 and light_rgb.min() < 0:
         notes.append(f"{light.name} lies outside {WORKING_SPACE}: negative channels of the lamps are clipped")
     lamp_rgb = neutral if level == 0 or folded else np.maximum(light_rgb, 0.0)

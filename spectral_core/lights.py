@@ -161,7 +161,8 @@ class Light:
 
     def _index_table(self) -> tuple[Float64Array, Float64Array]:
         """The evenly spaced table that Rf and Ra are defined for: the own one where that is even and
-        at most 5 nm; otherwise 1 nm, each line shared between its two neighbours by distance."""
+        at most 5 nm; otherwise 1 nm, each line shared between its two neighbours by distance.
+        """
         nm = self.wavelengths_nm
         if not self.lines.any() and len(nm) > 2 and np.ptp(np.diff(nm)) < 1e-9 and nm[1] - nm[0] <= COARSEST_STEP_NM:
             return nm, self.powers
@@ -232,7 +233,9 @@ def _key(name: str) -> str:
 def _check_powers(name: str, wavelengths: Float64Array, powers: Float64Array) -> None:
     bad = ~np.isfinite(powers)
     if bad.any():
-        raise LightError(f"power of '{name}' at {wavelengths[bad][0]:g} nm is not a finite number", remedy="correct the value")
+        raise LightError(
+            f"power of '{name}' at {wavelengths[bad][0]:g} nm is not a finite number", remedy="correct the value"
+        )
     if (powers < 0).any():
         where = int(np.argmax(powers < 0))
         raise LightError(

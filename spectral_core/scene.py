@@ -173,7 +173,9 @@ def _light(reader: TableReader, key: str, name: str, folder: Path) -> str:
     try:
         resolve_light(name, folder)
     except (LightError, SpectrumError) as error:
-        raise reader.error(key, f"names a light that cannot be used ({error})", "give a built-in name or a file") from None
+        raise reader.error(
+            key, f"names a light that cannot be used ({error})", "give a built-in name or a file"
+        ) from None
     return name
 
 

@@ -125,7 +125,9 @@ def read_toml(path: Path) -> tuple[str, TableReader]:
         If it is missing, no text, or no TOML (with the line).
     """
     if not path.is_file():
-        raise SceneError("no such file" if not path.exists() else "is a folder", where=path, remedy="name a scene's TOML file")
+        raise SceneError(
+            "no such file" if not path.exists() else "is a folder", where=path, remedy="name a scene's TOML file"
+        )
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (UnicodeDecodeError, OSError):

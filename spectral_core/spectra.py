@@ -67,18 +67,26 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
     header, body = _split_header(path, rows)
     width = len(body[0][1])
     if width < 2:
-        raise SpectrumError("one column only", where=_at(path, body[0][0]), remedy="give wavelengths in nm and at least one spectrum, separated by commas")
+        raise SpectrumError(
+            "one column only",
+            where=_at(path, body[0][0]),
+            remedy="give wavelengths in nm and at least one spectrum, separated by commas",
+        )
     table = np.array([_numbers(path, line, cells, width) for line, cells in body])
     wavelengths, values = _ascending(path, body, table[:, 0], table[:, 1:].T)
     _check_wavelengths(path, wavelengths, needs_curve=not lines)
     warnings = _check_values(path, wavelengths, values, quantity)
     if header is not None and len(header) != width:
-        raise SpectrumError(f"the header has {len(header)} columns, the data {width}", where=path, remedy="name every column")
+        raise SpectrumError(
+            f"the header has {len(header)} columns, the data {width}", where=path, remedy="name every column"
+        )
     names = tuple(name.strip() for name in header[1:]) if header else tuple(str(i + 1) for i in range(width - 1))
     return Spectra(names, frozen(wavelengths), frozen(values), header is not None, lines, tuple(warnings))
 
 
-def write_spectra(path: Path, wavelengths_nm: Float64Array, values: Float64Array, names: tuple[str, ...], lines: bool = False) -> None:
+def write_spectra(
+    path: Path, wavelengths_nm: Float64Array, values: Float64Array, names: tuple[str, ...], lines: bool = False
+) -> None:
     """Write spectra (spectra, n) as CSV that `read_spectra` gives back bit for bit."""
     from spectral_core.files import atomic_path
 
@@ -101,7 +109,9 @@ def _rows(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
         raise SpectrumError("the file holds no data", where=path, remedy="give one row per wavelength: nm, value")
     first = kept[0][1]
     delimiter = max(";\t,", key=first.count)
-    return [(number, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]) for number, line in kept], lines
+    return [
+        (number, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]) for number, line in kept
+    ], lines
 
 
 def read_text(path: Path) -> str:
@@ -111,7 +121,9 @@ def read_text(path: Path) -> str:
     if path.is_dir():
         raise SpectrumError("is a folder", where=path, remedy="name a file")
     if path.stat().st_size > _LARGEST_FILE_BYTES:
-        raise SpectrumError("larger than 256 MB, too large for a table of spectra", where=path, remedy="is it the right file?")
+        raise SpectrumError(
+            "larger than 256 MB, too large for a table of spectra", where=path, remedy="is it the right file?"
+        )
     try:
         return path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError:
@@ -120,29 +132,43 @@ def read_text(path: Path) -> str:
         raise SpectrumError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
 
 
-def _split_header(path: Path, rows: list[tuple[int, list[str]]]) -> tuple[list[str] | None, list[tuple[int, list[str]]]]:
+def _split_header(
+    path: Path, rows: list[tuple[int, list[str]]]
+) -> tuple[list[str] | None, list[tuple[int, list[str]]]]:
     """A first row whose first cell is no number is the header."""
     try:
         float(rows[0][1][0])
     except ValueError:
         if len(rows) == 1:
-            raise SpectrumError("a header and no data", where=path, remedy="give one row per wavelength: nm, value") from None
+            raise SpectrumError(
+                "a header and no data", where=path, remedy="give one row per wavelength: nm, value"
+            ) from None
         return rows[0][1], rows[1:]
     return None, rows
 
 
 def _numbers(path: Path, line: int, cells: list[str], width: int) -> list[float]:
     if len(cells) != width:
-        raise SpectrumError(f"{len(cells)} columns, the rows before have {width}", where=_at(path, line), remedy="give every row the same columns")
+        raise SpectrumError(
+            f"{len(cells)} columns, the rows before have {width}",
+            where=_at(path, line),
+            remedy="give every row the same columns",
+        )
     numbers = []
     for cell in cells:
         try:
             value = float(cell)
         except ValueError:
             what = "an empty cell" if not cell else f"'{cell[:40]}' is not a number"
-            raise SpectrumError(what, where=_at(path, line), remedy="use decimal points and no units in cells") from None
+            raise SpectrumError(
+                what, where=_at(path, line), remedy="use decimal points and no units in cells"
+            ) from None
         if not math.isfinite(value):
-            raise SpectrumError(f"'{cell}' is not a finite number", where=_at(path, line), remedy="measure, interpolate or drop that row")
+            raise SpectrumError(
+                f"'{cell}' is not a finite number",
+                where=_at(path, line),
+                remedy="measure, interpolate or drop that row",
+            )
         numbers.append(value)
     return numbers
 
@@ -157,7 +183,11 @@ def _ascending(
         return wavelengths[::-1], values[:, ::-1]
     if (steps == 0).any():
         at = int(np.argmax(steps == 0)) + 1
-        raise SpectrumError(f"wavelength {wavelengths[at]:g} nm occurs twice", where=_at(path, body[at][0]), remedy="keep one row per wavelength")
+        raise SpectrumError(
+            f"wavelength {wavelengths[at]:g} nm occurs twice",
+            where=_at(path, body[at][0]),
+            remedy="keep one row per wavelength",
+        )
     rising = (steps > 0).sum() >= (steps < 0).sum()
     at = int(np.argmax(steps < 0 if rising else steps > 0)) + 1
     repeated = f"; {wavelengths[at]:g} nm occurs twice" if wavelengths[at] in wavelengths[:at] else ""
@@ -173,12 +203,22 @@ def _check_wavelengths(path: Path, wavelengths: Float64Array, needs_curve: bool)
     for unit, factor in (("metres", 1e9), ("micrometres", 1e3)):
         if low > 0 and _PLAUSIBLE_NM[0] <= low * factor and high * factor <= _PLAUSIBLE_NM[1] and high < 10:
             raise SpectrumError(
-                f"wavelengths from {low:g} to {high:g} look like {unit}", where=path, remedy=f"multiply them by {factor:g} to give nanometres"
+                f"wavelengths from {low:g} to {high:g} look like {unit}",
+                where=path,
+                remedy=f"multiply them by {factor:g} to give nanometres",
             )
     if low < _PLAUSIBLE_NM[0] or high > _PLAUSIBLE_NM[1]:
-        raise SpectrumError(f"wavelengths from {low:g} to {high:g} are not nanometres of light", where=path, remedy="give the first column in nm")
+        raise SpectrumError(
+            f"wavelengths from {low:g} to {high:g} are not nanometres of light",
+            where=path,
+            remedy="give the first column in nm",
+        )
     if high < _VISIBLE_NM[0] or low > _VISIBLE_NM[1]:
-        raise SpectrumError(f"wavelengths from {low:g} to {high:g} nm miss the visible range", where=path, remedy="give data between 380 and 780 nm")
+        raise SpectrumError(
+            f"wavelengths from {low:g} to {high:g} nm miss the visible range",
+            where=path,
+            remedy="give data between 380 and 780 nm",
+        )
     if needs_curve and len(wavelengths) < 2:
         raise SpectrumError("one wavelength only", where=path, remedy="give a table, or mark it '# kind: lines'")
 
@@ -189,14 +229,18 @@ def _check_values(path: Path, wavelengths: Float64Array, values: Float64Array, q
         return []
     if values.max() > _LARGEST_REFLECTANCE:
         raise SpectrumError(
-            f"reflectance up to {values.max():g}", where=path, remedy="divide percentages by 100, and counts by the white reference"
+            f"reflectance up to {values.max():g}",
+            where=path,
+            remedy="divide percentages by 100, and counts by the white reference",
         )
     if values.min() < -0.5:
         raise SpectrumError(f"reflectance down to {values.min():g}", where=path, remedy="correct the dark signal")
     outside = ((values < 0) | (values > 1)).any(axis=0)
     if not outside.any():
         return []
-    return [f"reflectance from {values.min():g} to {values.max():g}, outside 0..1 at {int(outside.sum())} wavelengths; kept as measured"]
+    return [
+        f"reflectance from {values.min():g} to {values.max():g}, outside 0..1 at {int(outside.sum())} wavelengths; kept as measured"
+    ]
 
 
 def _at(path: Path, line: int) -> str:

@@ -139,7 +139,7 @@ def cct_and_duv(xy: Float64Array) -> tuple[float, float]:
 
 
 def planckian_or_daylight_xy(cct_K: float) -> Float64Array:
-    """xy of the reference of a CCT: Planckian below 5000 K, CIE daylight from there on.
+    """Xy of the reference of a CCT: Planckian below 5000 K, CIE daylight from there on.
 
     Raises
     ------
@@ -189,5 +189,7 @@ def _distribution(wavelengths_nm: Float64Array, powers: Float64Array) -> Any:
 
 def _finite(value: float, name: str) -> float:
     if not np.isfinite(value):
-        raise LightError(f"{name} is undefined for this spectrum", remedy="give a spectrum with power from 380 to 780 nm")
+        raise LightError(
+            f"{name} is undefined for this spectrum", remedy="give a spectrum with power from 380 to 780 nm"
+        )
     return value

@@ -66,7 +66,8 @@ class Surface:
 
     def reference_rgb(self, reference: Light) -> Float64Array:
         """Linear sRGB that an RGB pipeline has for it: the maker's, else its colour under the
-        reference light, clipped and rounded to 8 bits as in any RGB texture."""
+        reference light, clipped and rounded to 8 bits as in any RGB texture.
+        """
         if self.maker_rgb is not None:
             return self.maker_rgb
         codes = np.clip(srgb_encode(srgb().to_linear(self.XYZ(reference))), 0, 1)
@@ -115,7 +116,8 @@ def resolve_surface(source: SurfaceSource, folder: Path) -> Surface:
 @cache
 def colorchecker_maker_srgb() -> Float64Array:
     """(24, 3) 8-bit sRGB of the ColorChecker under D65 as its maker states them (X-Rite; published
-    with Diaz-Barrancas et al. 2020, Table 2)."""
+    with Diaz-Barrancas et al. 2020, Table 2).
+    """
     table = resources.files("spectral_core").joinpath("data/colorchecker_srgb_d65.csv").read_text(encoding="utf-8")
     return frozen([[float(row[f"ref_{channel}"]) for channel in "RGB"] for row in csv.DictReader(table.splitlines())])
 
@@ -123,7 +125,11 @@ def colorchecker_maker_srgb() -> Float64Array:
 def _colorchecker_patch(source: SurfaceSource) -> tuple[Float64Array, Float64Array, Float64Array]:
     names, wavelengths, values = standards.colorchecker()
     if source.value not in names:
-        raise SceneError(f"the ColorChecker has no patch '{source.value}'", where=f"surfaces.{source.name}", remedy=f"it has {', '.join(names)}")
+        raise SceneError(
+            f"the ColorChecker has no patch '{source.value}'",
+            where=f"surfaces.{source.name}",
+            remedy=f"it has {', '.join(names)}",
+        )
     index = names.index(source.value)
     return wavelengths, frozen(values[index]), frozen(srgb_decode(colorchecker_maker_srgb()[index] / 255))
 
@@ -132,5 +138,7 @@ def _from_library(library: Spectra, source: SurfaceSource, folder: Path) -> tupl
     name = source.spectrum or library.names[0]
     if name not in library.names or (not source.spectrum and len(library.names) > 1):
         problem = f"has no spectrum '{name}'" if source.spectrum else f"holds {len(library.names)} spectra"
-        raise SceneError(problem, where=folder / source.value, remedy=f"set 'spectrum' to one of {', '.join(library.names[:12])}")
+        raise SceneError(
+            problem, where=folder / source.value, remedy=f"set 'spectrum' to one of {', '.join(library.names[:12])}"
+        )
     return library.wavelengths_nm, frozen(library.values[library.names.index(name)])

@@ -87,7 +87,9 @@ class LevelResult:
     render_seconds: float
 
 
-def compare(readings: list[PatchReading], lighting: Lighting, switch_seconds: float = 0.0, render_seconds: float = 0.0) -> LevelResult:
+def compare(
+    readings: list[PatchReading], lighting: Lighting, switch_seconds: float = 0.0, render_seconds: float = 0.0
+) -> LevelResult:
     """Compare readings with theory for one lighting (any level; theory is always the exact colour)."""
     irradiance = np.array([reading.irradiance for reading in readings])[:, None]
     rendered = np.array([reading.rendered for reading in readings])

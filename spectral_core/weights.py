@@ -183,11 +183,15 @@ def interpolation_operator(source_nm: Float64Array, target_nm: Float64Array, kin
 
 def _checked_order(bands: Float64Array) -> np.ndarray:
     if bands.ndim != 1 or len(bands) == 0 or not np.all(np.isfinite(bands)):
-        raise SpectrumError("band wavelengths must be a list of finite numbers", remedy="give one wavelength in nm per band")
+        raise SpectrumError(
+            "band wavelengths must be a list of finite numbers", remedy="give one wavelength in nm per band"
+        )
     order = np.argsort(bands)
     repeated = bands[order][:-1][np.diff(bands[order]) == 0]
     if len(repeated):
-        raise SpectrumError(f"band wavelength {repeated[0]:g} nm occurs twice", remedy="average or drop one of the two bands")
+        raise SpectrumError(
+            f"band wavelength {repeated[0]:g} nm occurs twice", remedy="average or drop one of the two bands"
+        )
     return order
 
 

@@ -9,11 +9,12 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
-from . import lighting, state
-from .materials import make_material
 from spectral_core.scene import Camera, Lamp, RenderSettings, SceneDescription, SceneObject
 from spectral_core.shapes import Mesh, build_mesh
 from spectral_core.surfaces import scene_surfaces
+
+from . import lighting, state
+from .materials import make_material
 
 # Blender's spot: radiant intensity energy / (4 pi^2) per unit; this makes power 1 about one
 # lux-like unit of irradiance at one metre before the white is calibrated.

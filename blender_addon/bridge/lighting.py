@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from . import materials, measure, state
 from spectral_core.errors import BlenderError
 from spectral_core.lighting import Lighting, make_lighting
 from spectral_core.lights import Light
 from spectral_core.scene import SceneDescription, resolve_light
 from spectral_core.surfaces import scene_surfaces
+
+from . import materials, measure, state
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,9 @@ def calibrate_white(scene: bpy.types.Scene) -> Calibrated:
         raise BlenderError(f"the white target '{description.white.object}' is gone", remedy="build the scene again")
     mask = measure.identify(scene).masks[white.name]
     if not mask.any():
-        raise BlenderError(f"the camera does not see the white target '{white.name}'", remedy="move the camera or the target")
+        raise BlenderError(
+            f"the camera does not see the white target '{white.name}'", remedy="move the camera or the target"
+        )
     before = _white_luminance(scene, description, white, mask)
     factor = description.white.luminance / before
     for lamp in state.managed_lamps(scene):

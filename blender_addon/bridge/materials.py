@@ -5,9 +5,10 @@ from __future__ import annotations
 import bpy
 import numpy as np
 
-from .state import SURFACE_KEY
 from spectral_core.arrays import Float32Array, Float64Array
 from spectral_core.surfaces import Surface
+
+from .state import SURFACE_KEY
 
 DIFFUSE = "Spectral Diffuse"
 IMAGE = "Spectral Image"

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
+from spectral_core.arrays import Float32Array, Float64Array
+
 from . import materials, state
 from .render import render_linear
-from spectral_core.arrays import Float32Array, Float64Array
 
 # The reconstruction filter is 1.5 pixels wide: two pixels from an edge nothing else is mixed in.
 _BORDER_PIXELS = 2
@@ -74,7 +75,8 @@ def illumination(scene: bpy.types.Scene) -> Illumination:
 
 def sample(image: Float64Array, uv: Float32Array) -> Float64Array:
     """Bilinear samples (n, 3) of an image (height, width, 3) from the top, at uv (n, 2), repeating:
-    texel centres lie at half texels, as on a GPU."""
+    texel centres lie at half texels, as on a GPU.
+    """
     height, width, _ = image.shape
     x = uv[:, 0].astype(np.float64) * width - 0.5
     y = (1.0 - uv[:, 1].astype(np.float64)) * height - 0.5

@@ -67,7 +67,9 @@ def _output(scene: bpy.types.Scene, path: Path, file_format: str, depth: str) ->
 
 def _read(path: Path) -> Float32Array:
     if not path.exists() or not os.path.getsize(path):
-        raise BlenderError("Blender wrote no image", remedy="is there room in the temporary folder, and a graphics driver?")
+        raise BlenderError(
+            "Blender wrote no image", remedy="is there room in the temporary folder, and a graphics driver?"
+        )
     image = bpy.data.images.load(str(path), check_existing=False)
     try:
         image.colorspace_settings.name = "Non-Color"

@@ -39,7 +39,8 @@ def _htc_vive_2021() -> DisplayProfile:
 @cache
 def _htc_vive_2020() -> DisplayProfile:
     """Primaries scaled per channel so that they sum to the measured white (the headset is not
-    additive: unscaled they sum to 113.5 %), black added."""
+    additive: unscaled they sum to 113.5 %), black added.
+    """
     XYZ = {name: _xyY_to_XYZ(*values) / 100 for name, values in _TABLE_1.items()}
     primaries = np.stack([XYZ["red"], XYZ["green"], XYZ["blue"]], axis=1)
     matrix = primaries * np.linalg.solve(primaries, XYZ["white"])

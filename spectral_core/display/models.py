@@ -38,7 +38,7 @@ def signed_power(values: Float64Array, exponent: Float64Array | float) -> Float6
 
 
 def srgb_encode(linear: Float64Array) -> Float64Array:
-    """sRGB codes of linear sRGB (IEC 61966-2-1), by odd symmetry below zero, not clipped.
+    """SRGB codes of linear sRGB (IEC 61966-2-1), by odd symmetry below zero, not clipped.
 
     The type of the input is kept: float32 stays float32.
     """
@@ -118,7 +118,7 @@ class SRGBCurve:
         return np.asarray(np.asarray(XYZ) @ np.linalg.inv(self.matrix).T)
 
     def encode(self, linear: Float64Array) -> Float64Array:
-        """sRGB codes (..., 3) of linear sRGB (..., 3), not clipped."""
+        """SRGB codes (..., 3) of linear sRGB (..., 3), not clipped."""
         return srgb_encode(np.asarray(linear))
 
     def inverse(self, XYZ: Float64Array) -> Float64Array:

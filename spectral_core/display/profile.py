@@ -85,7 +85,11 @@ def read_profile(path: Path) -> DisplayProfile:
     """
     document = _json(path)
     if document.get("format") != _FORMAT or document.get("version") != _VERSION:
-        raise DisplayError("is not a display profile of this version", where=path, remedy=f"it must say format '{_FORMAT}', version {_VERSION}")
+        raise DisplayError(
+            "is not a display profile of this version",
+            where=path,
+            remedy=f"it must say format '{_FORMAT}', version {_VERSION}",
+        )
     model = document.get("model")
     if not isinstance(model, dict) or model.get("type") != "gamma-matrix":
         raise DisplayError("has no model of type 'gamma-matrix'", where=path, remedy="characterise the display again")
@@ -94,16 +98,24 @@ def read_profile(path: Path) -> DisplayProfile:
     except KeyError as error:
         raise DisplayError(f"the model lacks {error}", where=path, remedy="correct the profile") from None
     except (TypeError, ValueError):
-        raise DisplayError("the model holds something that is no number", where=path, remedy="correct the profile") from None
+        raise DisplayError(
+            "the model holds something that is no number", where=path, remedy="correct the profile"
+        ) from None
     try:
-        return DisplayProfile(str(document.get("name", path.stem)), GammaMatrix(**parameters), str(document.get("source", "")))
+        return DisplayProfile(
+            str(document.get("name", path.stem)), GammaMatrix(**parameters), str(document.get("source", ""))
+        )
     except DisplayError as error:
         raise DisplayError(error.problem, where=path, remedy=error.remedy) from None
 
 
 def _json(path: Path) -> dict[str, Any]:
     if not path.is_file():
-        raise DisplayError("no such file, and no built-in profile of that name", where=path, remedy="use sRGB, htc-vive-2021, htc-vive-2020 or a file")
+        raise DisplayError(
+            "no such file, and no built-in profile of that name",
+            where=path,
+            remedy="use sRGB, htc-vive-2021, htc-vive-2020 or a file",
+        )
     try:
         document = json.loads(path.read_text(encoding="utf-8-sig"))
     except (UnicodeDecodeError, json.JSONDecodeError, RecursionError):

@@ -64,7 +64,11 @@ class NpzTexture(HyperspectralTexture):
                 self._shape, fortran, self._dtype = self._read_header(archive, members[self._member])
                 _check_cube(self._shape, self._dtype, path)
                 if fortran:
-                    raise TextureError("the cube is in Fortran order, which cannot be streamed", where=path, remedy="save numpy.ascontiguousarray of it")
+                    raise TextureError(
+                        "the cube is in Fortran order, which cannot be streamed",
+                        where=path,
+                        remedy="save numpy.ascontiguousarray of it",
+                    )
                 wavelengths = _small_array(archive, members, path)
         except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError) as error:
             raise TextureError(f"is a damaged archive ({error})", where=path, remedy="write it again") from None
@@ -94,7 +98,9 @@ class NpzTexture(HyperspectralTexture):
         except (zipfile.BadZipFile, EOFError, OSError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
             raise TextureError(f"is a damaged archive ({error})", where=self._path, remedy="write it again") from None
         if len(data) < count * row_bytes:
-            raise TextureError(f"ends in row {first + len(data) // row_bytes}", where=self._path, remedy="write it again")
+            raise TextureError(
+                f"ends in row {first + len(data) // row_bytes}", where=self._path, remedy="write it again"
+            )
         self._next_row = first + count
         return np.frombuffer(data, dtype=self._dtype).reshape(count, self.width, self.bands).astype(np.float32)
 
@@ -113,21 +119,29 @@ def _header(stream: IO[bytes], path: Path) -> tuple[tuple[int, ...], bool, np.dt
             return np.lib.format.read_array_header_1_0(stream)
         return np.lib.format.read_array_header_2_0(stream)
     except (ValueError, EOFError) as error:
-        raise TextureError(f"has a damaged NumPy header ({str(error).splitlines()[0]})", where=path, remedy="write it again") from None
+        raise TextureError(
+            f"has a damaged NumPy header ({str(error).splitlines()[0]})", where=path, remedy="write it again"
+        ) from None
 
 
 def _check_cube(shape: tuple[int, ...], dtype: np.dtype, path: Path) -> None:
     if len(shape) != 3 or not all(0 < side <= _LARGEST_SIDE for side in shape) or shape[2] > _LARGEST_BANDS:
         raise TextureError(f"holds an array of shape {shape}", where=path, remedy="give (height, width, bands)")
     if dtype.hasobject or dtype.kind != "f":
-        raise TextureError(f"holds values of type {dtype}, not floating point", where=path, remedy="divide counts by the white reference and save float32")
+        raise TextureError(
+            f"holds values of type {dtype}, not floating point",
+            where=path,
+            remedy="divide counts by the white reference and save float32",
+        )
 
 
 def _check_size(available: int, shape: tuple[int, ...], dtype: np.dtype, path: Path) -> None:
     promised = math.prod(shape) * dtype.itemsize
     if available < promised:
         raise TextureError(
-            f"the header promises {promised:,} bytes for {shape}, the file holds {max(available, 0):,}", where=path, remedy="the file is cut short; copy or write it again"
+            f"the header promises {promised:,} bytes for {shape}, the file holds {max(available, 0):,}",
+            where=path,
+            remedy="the file is cut short; copy or write it again",
         )
 
 
@@ -137,7 +151,9 @@ def _cube_member(members: dict[str, zipfile.ZipInfo], path: Path) -> tuple[str, 
         if kind in members:
             return kind, kind
     raise TextureError(
-        f"holds {', '.join(sorted(members)[:6]) or 'nothing'}", where=path, remedy="save it as numpy.savez(file, reflectance=..., wavelengths_nm=...)"
+        f"holds {', '.join(sorted(members)[:6]) or 'nothing'}",
+        where=path,
+        remedy="save it as numpy.savez(file, reflectance=..., wavelengths_nm=...)",
     )
 
 
@@ -151,17 +167,27 @@ def _small_array(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], 
         try:
             return np.asarray(np.lib.format.read_array(stream, allow_pickle=False), dtype=np.float64)
         except (ValueError, TypeError) as error:
-            raise TextureError(f"'wavelengths_nm' cannot be read ({str(error).splitlines()[0]})", where=path, remedy="save plain numbers") from None
+            raise TextureError(
+                f"'wavelengths_nm' cannot be read ({str(error).splitlines()[0]})",
+                where=path,
+                remedy="save plain numbers",
+            ) from None
 
 
 def _wavelengths_beside(path: Path, bands: int) -> np.ndarray:
     beside = path.with_name(f"{path.stem}.wavelengths.csv")
     if not beside.is_file():
-        raise TextureError("an .npy file does not say its wavelengths", where=path, remedy=f"write {beside.name} beside it, one wavelength in nm a line, or save .npz")
+        raise TextureError(
+            "an .npy file does not say its wavelengths",
+            where=path,
+            remedy=f"write {beside.name} beside it, one wavelength in nm a line, or save .npz",
+        )
     try:
         values = [float(line) for line in read_text(beside).splitlines() if line.strip() and not line.startswith("#")]
     except ValueError as error:
-        raise TextureError(f"holds something that is no number ({error})", where=beside, remedy="give one wavelength in nm a line") from None
+        raise TextureError(
+            f"holds something that is no number ({error})", where=beside, remedy="give one wavelength in nm a line"
+        ) from None
     except SpectrumError as error:
         raise TextureError(error.problem, where=beside, remedy=error.remedy) from None
     return _checked_wavelengths(np.array(values), bands, beside)
@@ -169,7 +195,9 @@ def _wavelengths_beside(path: Path, bands: int) -> np.ndarray:
 
 def _checked_wavelengths(wavelengths: np.ndarray, bands: int, path: Path) -> np.ndarray:
     if wavelengths.shape != (bands,):
-        raise TextureError(f"{wavelengths.size} wavelengths for {bands} bands", where=path, remedy="give one wavelength per band")
+        raise TextureError(
+            f"{wavelengths.size} wavelengths for {bands} bands", where=path, remedy="give one wavelength per band"
+        )
     if not np.isfinite(wavelengths).all() or wavelengths.min() < 100 or wavelengths.max() > 5000:
         raise TextureError("the wavelengths are not nanometres of light", where=path, remedy="give them in nm")
     if len(np.unique(wavelengths)) < bands:

@@ -26,7 +26,9 @@ def open_texture(path: str | Path) -> HyperspectralTexture:
     """
     path = Path(path)
     if not path.is_file():
-        raise TextureError("no such file" if not path.exists() else "is a folder", where=path, remedy="name a texture file")
+        raise TextureError(
+            "no such file" if not path.exists() else "is a folder", where=path, remedy="name a texture file"
+        )
     try:
         with path.open("rb") as stream:
             head = stream.read(8)

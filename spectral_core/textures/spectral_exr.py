@@ -68,8 +68,14 @@ class SpectralExrTexture(HyperspectralTexture):
             top = self._origin_y + first
             pixels = self._input.read_scanlines(0, 0, top, top + count, 0, low, high, "float")
         if pixels is None:
-            raise TextureError(f"row {first} cannot be read ({self._input.geterror()})", where=self._path, remedy="the file is damaged; write it again")
-        return np.ascontiguousarray(np.asarray(pixels).reshape(count, self.width, high - low)[..., [c - low for c in channels]])
+            raise TextureError(
+                f"row {first} cannot be read ({self._input.geterror()})",
+                where=self._path,
+                remedy="the file is damaged; write it again",
+            )
+        return np.ascontiguousarray(
+            np.asarray(pixels).reshape(count, self.width, high - low)[..., [c - low for c in channels]]
+        )
 
     def _tiled_rows(self, first: int, count: int, low: int, high: int) -> Any:
         spec = self._input.spec()
@@ -89,12 +95,18 @@ def _last_error() -> str:
 
 def _refuse_what_cannot_be_shown(names: tuple[str, ...], path: Path) -> None:
     if any(_BISPECTRAL.match(name) for name in names):
-        raise TextureError("is bispectral (fluorescent): its colour under a lamp is no product of spectra", where=path, remedy="give the non-fluorescent reflectance")
+        raise TextureError(
+            "is bispectral (fluorescent): its colour under a lamp is no product of spectra",
+            where=path,
+            remedy="give the non-fluorescent reflectance",
+        )
     parts = {match.group(1) for name in names if (match := _CHANNEL.match(name))}
     if parts & {"S1", "S2", "S3"}:
         raise TextureError("is polarised (Stokes S1 to S3)", where=path, remedy="keep only the S0 channels")
     if {"S0", "T"} <= parts:
-        raise TextureError("mixes reflective (T) and emissive (S0) channels", where=path, remedy="split the file in two")
+        raise TextureError(
+            "mixes reflective (T) and emissive (S0) channels", where=path, remedy="split the file in two"
+        )
 
 
 def _spectral_channels(names: tuple[str, ...], path: Path) -> tuple[Kind, list[tuple[float, int]]]:
@@ -108,11 +120,19 @@ def _spectral_channels(names: tuple[str, ...], path: Path) -> tuple[Kind, list[t
         try:
             value = float(number.replace(",", ".")) * _PREFIX[prefix or ""]
         except ValueError:
-            raise TextureError(f"channel '{name}' has no wavelength", where=path, remedy="name channels like T.450,000000nm") from None
+            raise TextureError(
+                f"channel '{name}' has no wavelength", where=path, remedy="name channels like T.450,000000nm"
+            ) from None
         if value <= 0:
-            raise TextureError(f"channel '{name}' has no wavelength", where=path, remedy="name channels like T.450,000000nm")
+            raise TextureError(
+                f"channel '{name}' has no wavelength", where=path, remedy="name channels like T.450,000000nm"
+            )
         channels.append(((_SPEED_OF_LIGHT / value if unit == "Hz" else value) * 1e9, index))
         kind = "radiance" if part == "S0" else "reflectance"
     if not channels:
-        raise TextureError(f"has no spectral channels, only {', '.join(names[:5])}", where=path, remedy="give channels like T.450,000000nm (Fichet et al. 2021)")
+        raise TextureError(
+            f"has no spectral channels, only {', '.join(names[:5])}",
+            where=path,
+            remedy="give channels like T.450,000000nm (Fichet et al. 2021)",
+        )
     return kind, channels  # type: ignore[return-value]

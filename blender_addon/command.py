@@ -1,0 +1,239 @@
+"""Commands inside Blender: ``blender -b FILE --command spectral_booth VERB ...``.
+
+With the bpy module instead of an application: ``python -m blender_addon.command VERB ...``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import bpy
+
+from spectral_core.bake import bake
+from spectral_core.display import load_profile
+from spectral_core.errors import BlenderError, SpectralBoothError
+from spectral_core.files import atomic_path
+from spectral_core.imaging import IMAGE_FORMATS
+from spectral_core.lights import Light
+from spectral_core.report.documents import bake_document, verify_document
+from spectral_core.scene import load_scene
+from spectral_core.textures import open_texture
+from spectral_core.verification import worst_stages
+
+NAME = "spectral_booth"
+PROGRESS = "spectral-booth progress"
+
+Result = dict[str, Any]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one verb; 0 done, 2 bad input with one line on stderr."""
+    arguments = _parser().parse_args(sys.argv[1:] if argv is None else list(argv))
+    try:
+        result = arguments.run(arguments)
+    except SpectralBoothError as error:
+        print(f"error: {error}", file=sys.stderr, flush=True)
+        return 2
+    text = json.dumps(result, indent=None if arguments.result else 2)
+    if arguments.result:
+        arguments.result.write_text(text, encoding="utf-8")
+    else:
+        print(text, flush=True)
+    return 0
+
+
+def build(arguments: argparse.Namespace) -> Result:
+    """Build a scene from TOML in an empty file, calibrate its white, save it."""
+    from .bridge import build as building
+    from .bridge import lighting
+
+    started = time.perf_counter()
+    description = load_scene(arguments.scene)
+    output = _blend_path(arguments.output)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    scene = bpy.context.scene
+    scene.name = description.name
+    progress(0.1, "building")
+    built = building.build_scene(scene, description)
+    progress(0.4, "calibrating the white")
+    calibrated = lighting.calibrate_white(scene)
+    _save(output)
+    return {
+        "file": str(output),
+        "objects": built.objects,
+        "materials": built.materials,
+        "lights": built.lights,
+        "white_luminance": calibrated.after,
+        "seconds": time.perf_counter() - started,
+    }
+
+
+def render(arguments: argparse.Namespace) -> Result:
+    """Render a .blend under a light at a level to PNG."""
+    from .bridge import lighting
+    from .bridge.render import render_png
+
+    scene = _open(arguments.file)
+    if arguments.stereo:
+        raise BlenderError("stereo renders are not available yet", remedy="render without --stereo")
+    applied = lighting.apply(scene, arguments.light or scene.spectral_booth.light, _level(arguments, scene))
+    progress(0.1, f"rendering {applied.lighting.light.name}")
+    seconds = render_png(scene, arguments.output)
+    return {
+        "file": str(arguments.output),
+        "light": applied.lighting.light.name,
+        "level": applied.lighting.level,
+        "seconds": seconds,
+        "notes": list(applied.lighting.notes),
+    }
+
+
+def verify(arguments: argparse.Namespace) -> Result:
+    """Verify a .blend under its lights, from rendered pixels."""
+    from .bridge import state
+    from .bridge import verify as verifying
+
+    scene = _open(arguments.file)
+    description = state.description(scene)
+    lights = arguments.light or list(description.lights)
+    for light in lights:
+        Light.load(light) if not (description.folder / light).is_file() else None
+    started = time.perf_counter()
+    results = verifying.verify(scene, lights, tuple(arguments.level or (0, 1, 2)), arguments.images, progress)
+    return verify_document(
+        results,
+        worst_stages(results),
+        verifying.left_out(scene),
+        scene=description.name,
+        blender=bpy.app.version_string,
+        shading="forward" if description.render.forward else "deferred",
+        file=str(arguments.file or bpy.data.filepath),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def bake_texture(arguments: argparse.Namespace) -> Result:
+    """Bake a hyperspectral texture under lights, as `spectral-booth bake` does."""
+    texture = open_texture(arguments.file)
+    profile = load_profile(arguments.profile)
+    result = bake(
+        texture,
+        [Light.load(each) for each in arguments.light],
+        arguments.output,
+        profile=profile,
+        image_format=arguments.format,
+        levels=tuple(arguments.level or (2,)),
+        progress=progress,
+    )
+    return bake_document(result)
+
+
+def progress(fraction: float, what: str) -> None:
+    """One line per step on stderr; the command-line program turns them into a bar."""
+    print(f"{PROGRESS} {fraction:.3f} {what}", file=sys.stderr, flush=True)
+
+
+def register() -> None:
+    """Offer the verbs as ``--command spectral_booth``; absent from the bpy module."""
+    global _handle
+    if hasattr(bpy.utils, "register_cli_command"):
+        _handle = bpy.utils.register_cli_command(NAME, _blender_command)
+
+
+def unregister() -> None:
+    """Take them back."""
+    global _handle
+    if _handle is not None:
+        bpy.utils.unregister_cli_command(_handle)
+        _handle = None
+
+
+_handle: object | None = None
+
+
+def _blender_command(argv: list[str]) -> int:
+    return main(argv)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog=NAME, description="Spectral Booth inside Blender")
+    verbs = parser.add_subparsers(required=True, metavar="VERB")
+
+    def verb(name: str, run: Callable[[argparse.Namespace], Result]) -> argparse.ArgumentParser:
+        made = verbs.add_parser(name, help=(run.__doc__ or "").splitlines()[0])
+        made.set_defaults(run=run)
+        made.add_argument("--result", type=Path, help="write the JSON there instead of standard output")
+        return made
+
+    command = verb("build", build)
+    command.add_argument("scene", type=Path)
+    command.add_argument("-o", "--output", type=Path, required=True)
+    command = verb("render", render)
+    command.add_argument("file", type=Path, nargs="?", help="a .blend; the open file if left out")
+    command.add_argument("--light", help="name or file; the scene's own if left out")
+    command.add_argument("--level", type=int, choices=(0, 1, 2))
+    command.add_argument("--stereo", action="store_true")
+    command.add_argument("-o", "--output", type=Path, required=True)
+    command = verb("verify", verify)
+    command.add_argument("file", type=Path, nargs="?", help="a .blend; the open file if left out")
+    command.add_argument("--light", action="append", help="repeat for several; all of the scene's if left out")
+    command.add_argument("--level", type=int, choices=(0, 1, 2), action="append")
+    command.add_argument("--images", type=Path, help="keep the renders in this folder")
+    command = verb("bake", bake_texture)
+    command.add_argument("file", type=Path)
+    command.add_argument("--light", action="append", required=True)
+    command.add_argument("-o", "--output", type=Path, required=True)
+    command.add_argument("--profile", default="sRGB")
+    command.add_argument("--format", choices=sorted(IMAGE_FORMATS), default="exr")
+    command.add_argument("--level", type=int, choices=(1, 2), action="append")
+    return parser
+
+
+def _level(arguments: argparse.Namespace, scene: bpy.types.Scene) -> int:
+    return int(scene.spectral_booth.level) if arguments.level is None else int(arguments.level)
+
+
+def _open(path: Path | None) -> bpy.types.Scene:
+    """The managed scene of a .blend, or of the file that is open."""
+    from .bridge import state
+
+    if path is not None:
+        if not path.is_file():
+            raise BlenderError("no such file", where=path, remedy="build one with `spectral-booth build`")
+        try:
+            bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=False)
+        except RuntimeError as error:
+            raise BlenderError(
+                f"Blender cannot open it ({str(error).splitlines()[0]})", where=path, remedy="is it a .blend?"
+            ) from None
+    managed = [scene for scene in bpy.data.scenes if state.is_managed(scene)]
+    if not managed:
+        raise BlenderError("holds no spectral scene", where=path, remedy="build one with `spectral-booth build`")
+    scene = bpy.context.scene if bpy.context.scene in managed else managed[0]
+    if bpy.context.window is not None:
+        bpy.context.window.scene = scene
+    return scene
+
+
+def _blend_path(path: Path) -> Path:
+    if path.suffix != ".blend":
+        raise BlenderError("is no name for a Blender file", where=path, remedy="end it with .blend")
+    return path.resolve()
+
+
+def _save(path: Path) -> None:
+    with atomic_path(path) as temporary:
+        bpy.ops.wm.save_as_mainfile(filepath=str(temporary), check_existing=False, compress=True, copy=True)
+
+
+if __name__ == "__main__":
+    from blender_addon import props
+
+    props.register()
+    sys.exit(main())
