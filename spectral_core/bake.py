@@ -18,12 +18,14 @@ import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array
 from spectral_core.display import DisplayProfile, srgb
+from spectral_core.display.profile import in_gamut
 from spectral_core.errors import OutputError, TextureError
 from spectral_core.files import atomic_path
 from spectral_core.imaging import IMAGE_FORMATS, ImageFormat, ImageWriter
 from spectral_core.lights import Light
+from spectral_core.memory import anonymous_MB
 from spectral_core.standards import DEFAULT_OBSERVER
-from spectral_core.textures import HyperspectralTexture
+from spectral_core.textures import HyperspectralTexture, Tile
 
 Progress = Callable[[float, str], None]
 
@@ -47,7 +49,7 @@ class BakeResult:
     seconds: dict[str, float]
     pixels: int
     bands: int
-    repaired: int = 0
+    peak_memory_MB: float | None
 
 
 def level2_weights(
@@ -72,14 +74,19 @@ def project(texture: HyperspectralTexture, weights: Float64Array) -> Iterator[tu
     """
     factors = weights.astype(np.float32)
     for tile in texture.tiles():
-        rows, width, bands = tile.values.shape
-        values = (tile.values.reshape(-1, bands) @ factors).reshape(rows, width, -1)
-        if not np.isfinite(values).all():
-            row = tile.first_row + int(np.argmax(~np.isfinite(values).all(axis=(1, 2))))
-            raise TextureError(
-                f"'{texture.name}' has a value that is no finite number in row {row}", remedy="repair the capture"
-            )
-        yield tile.first_row, values
+        yield tile.first_row, project_tile(texture, tile, factors)
+
+
+def project_tile(texture: HyperspectralTexture, tile: Tile, factors: Float32Array) -> Float32Array:
+    """(rows, width, columns) of one tile times factors (bands, columns)."""
+    rows, width, bands = tile.values.shape
+    values = (tile.values.reshape(-1, bands) @ factors).reshape(rows, width, -1)
+    if not np.isfinite(values).all():
+        row = tile.first_row + int(np.argmax(~np.isfinite(values).all(axis=(1, 2))))
+        raise TextureError(
+            f"'{texture.name}' has a value that is no finite number in row {row}", remedy="repair the capture"
+        )
+    return np.asarray(values, dtype=np.float32)
 
 
 def bake(
@@ -98,10 +105,8 @@ def bake(
     EXR images hold linear RGB of the profile, PNG and TIFF its device codes, both with the perfect
     diffuser at Y = 1. Out-of-gamut values are clipped in integer formats and counted in all.
 
-    Parameters
-    ----------
-    reference
-        The white under which an RGB camera would have seen the texture, for level 1; D65 if None.
+    `reference` is the light under which an RGB camera would have seen the texture, for level 1;
+    D65 if None.
 
     Raises
     ------
@@ -120,7 +125,9 @@ def bake(
     weights = level2_weights(texture, [*lights, reference] if 1 in levels else lights, observer)
     jobs = [(level, index) for level in levels for index in range(len(lights))]
     paths = _image_paths(texture.name, lights, jobs, Path(folder), image_format)
-    lamp_colours = np.array([profile.to_linear(light.XYZ(observer)) for light in lights])
+    factors = weights.astype(np.float32)
+    lamp_colours = np.array([profile.to_linear(light.XYZ(observer)) for light in lights], dtype=np.float32)
+    memory = [anonymous_MB() or 0.0]
     seconds = {"read": 0.0, "project": 0.0, "write": 0.0, "total": 0.0}
     started = time.perf_counter()
     clipped = np.zeros(len(jobs), dtype=np.int64)
@@ -128,18 +135,20 @@ def bake(
         temporaries = [stack.enter_context(atomic_path(path)) for path in paths]
         writers = [ImageWriter(temporary, texture.width, texture.height, image_format) for temporary in temporaries]
         try:
-            for first, XYZ in _timed(project(texture, weights), seconds):
+            for tile in _timed(texture.tiles(), seconds):
                 mark = time.perf_counter()
+                XYZ = project_tile(texture, tile, factors)
                 linear = np.asarray(profile.to_linear(XYZ.reshape(*XYZ.shape[:2], -1, 3)), dtype=np.float32)
+                seconds["project"] += time.perf_counter() - mark
+                mark = time.perf_counter()
                 for number, (level, index) in enumerate(jobs):
-                    pixels = (
-                        linear[:, :, index] if level == 2 else linear[:, :, -1] * lamp_colours[index].astype(np.float32)
-                    )
+                    pixels = linear[:, :, index] if level == 2 else linear[:, :, -1] * lamp_colours[index]
                     clipped[number] += _outside(pixels)
                     writers[number].write(_encode(pixels, profile, image_format))
                 seconds["write"] += time.perf_counter() - mark
+                memory.append(anonymous_MB() or 0.0)
                 if progress:
-                    progress((first + len(XYZ)) / texture.height, f"baking {texture.name}")
+                    progress((tile.first_row + len(XYZ)) / texture.height, f"baking {texture.name}")
         except BaseException:
             for writer in writers:
                 with contextlib.suppress(OutputError):  # the first error is the one to report
@@ -154,17 +163,17 @@ def bake(
         BakedImage(lights[index].name, level, path, float(count / pixels_total), extended[index])
         for (level, index), path, count in zip(jobs, paths, clipped, strict=True)
     )
-    return BakeResult(images, seconds, pixels_total, texture.bands)
+    return BakeResult(images, seconds, pixels_total, texture.bands, max(memory) or None)
 
 
-def _timed(tiles: Iterator[tuple[int, Float32Array]], seconds: dict[str, float]) -> Iterator[tuple[int, Float32Array]]:
+def _timed(tiles: Iterator[Tile], seconds: dict[str, float]) -> Iterator[Tile]:
+    """The tiles, with the time that reading them takes."""
     while True:
         mark = time.perf_counter()
-        try:
-            tile = next(tiles)
-        except StopIteration:
+        tile = next(tiles, None)
+        seconds["read"] += time.perf_counter() - mark
+        if tile is None:
             return
-        seconds["project"] += time.perf_counter() - mark
         yield tile
 
 
@@ -187,8 +196,8 @@ def file_name(name: str) -> str:
 
 
 def _outside(linear: Float32Array) -> int:
-    """Pixels with a channel outside 0..1; the tolerance is half a 16-bit level at black, in linear light."""
-    return int(((linear < -1e-6) | (linear > 1 + 1e-6)).any(axis=-1).sum())
+    """How many pixels are out of gamut."""
+    return int((~in_gamut(linear)).sum())
 
 
 def _encode(linear: Float32Array, profile: DisplayProfile, image_format: str) -> Float32Array:

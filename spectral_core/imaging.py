@@ -35,7 +35,7 @@ def oiio() -> ModuleType:
             raise
         sys.path.append(str(bundled))
         import OpenImageIO
-    return OpenImageIO  # type: ignore[no-any-return]
+    return OpenImageIO
 
 
 def _bundled_with_blender() -> Path | None:

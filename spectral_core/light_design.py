@@ -7,6 +7,7 @@ hardest test of colour management under lamps (Diaz-Barrancas et al. 2020, secti
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
@@ -126,14 +127,14 @@ def builtin_design(name: str) -> Light:
 
 
 def _line_XYZ(wavelength: float, observer: str) -> Float64Array:
-    return weights.colour_matching(np.array([wavelength]), observer)[0]
+    return np.asarray(weights.colour_matching(np.array([wavelength]), observer)[0])
 
 
 def _xy(XYZ: Float64Array) -> Float64Array:
     return np.asarray(XYZ[:2] / XYZ.sum())
 
 
-def _bisect(function, low: float, high: float) -> float:  # type: ignore[no-untyped-def]
+def _bisect(function: Callable[[float], float], low: float, high: float) -> float:
     sign = function(low)
     for _ in range(60):
         middle = (low + high) / 2
@@ -195,7 +196,7 @@ def _best_mixture(vertices: Float64Array, leds: Float64Array) -> tuple[Float64Ar
                 if score > best:
                     weights_, best, improved = trial, score, True
         step = step if improved else step / 2
-    return weights_ @ vertices, best
+    return np.asarray(weights_ @ vertices), best
 
 
 def _rf(mixture: Float64Array, leds: Float64Array) -> float:

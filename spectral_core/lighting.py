@@ -76,7 +76,8 @@ def make_lighting(light: Light, level: int, luminance: float) -> Lighting:
             if value < SMALLEST_CHANNEL_SHARE * light_rgb.max()
         )
         notes.append(
-            f"{light.name} has too little {channels} in {WORKING_SPACE} for a lamp: neutral lamps, the light is in the materials"
+            f"{light.name} has too little {channels} in {WORKING_SPACE} for a lamp: "
+            "the lamps are neutral, the light is in the materials"
         )
     if level == 1 and light_rgb.min() < 0:
         notes.append(f"{light.name} lies outside {WORKING_SPACE}: negative channels of the lamps are clipped")

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core import standards, weights
-from spectral_core.arrays import Float64Array, frozen
+from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.errors import LightError, SpectrumError
 from spectral_core.spectra import Spectra, read_spectra
 from spectral_core.standards import DEFAULT_OBSERVER
@@ -60,7 +60,7 @@ class Light:
     name: str
     wavelengths_nm: Float64Array
     powers: Float64Array
-    lines: np.ndarray
+    lines: BoolArray
     kind: str = "file"
     warnings: tuple[str, ...] = ()
 

@@ -239,9 +239,18 @@ def _check_values(path: Path, wavelengths: Float64Array, values: Float64Array, q
     if not outside.any():
         return []
     return [
-        f"reflectance from {values.min():g} to {values.max():g}, outside 0..1 at {int(outside.sum())} wavelengths; kept as measured"
+        f"reflectance from {values.min():g} to {values.max():g}, outside 0..1 at {int(outside.sum())} wavelengths; "
+        "kept as measured"
     ]
 
 
 def _at(path: Path, line: int) -> str:
     return f"{path}, line {line}"
+
+
+def colorchecker_spectra() -> Spectra:
+    """The 24 reflectances of the ColorChecker (BabelColor Average, 380 to 730 nm in 10 nm)."""
+    from spectral_core import standards
+
+    names, wavelengths, values = standards.colorchecker()
+    return Spectra(names, wavelengths, values)

@@ -152,9 +152,8 @@ def planckian_or_daylight_xy(cct_K: float) -> Float64Array:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         if cct_K < 5000:
-            return np.asarray(colour.temperature.CCT_to_XYZ_Ohno2013([cct_K, 0.0]))[:2] / np.sum(
-                colour.temperature.CCT_to_XYZ_Ohno2013([cct_K, 0.0])
-            )
+            XYZ = np.asarray(colour.temperature.CCT_to_XYZ_Ohno2013([cct_K, 0.0]))
+            return np.asarray(XYZ[:2] / XYZ.sum())
         return np.asarray(colour.temperature.CCT_to_xy_CIE_D(cct_K))
 
 

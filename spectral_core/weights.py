@@ -17,7 +17,7 @@ from functools import cache
 
 import numpy as np
 
-from spectral_core.arrays import Float64Array, frozen
+from spectral_core.arrays import Float64Array, IntArray, frozen
 from spectral_core.errors import LightError, SpectrumError
 from spectral_core.standards import DEFAULT_OBSERVER, observer_table
 
@@ -61,7 +61,7 @@ def quadrature_widths(wavelengths_nm: Float64Array) -> Float64Array:
     if len(wavelengths_nm) < 2:
         return np.ones_like(wavelengths_nm)
     gaps = np.diff(wavelengths_nm)
-    return (np.concatenate([gaps[:1], gaps]) + np.concatenate([gaps, gaps[-1:]])) / 2
+    return np.asarray((np.concatenate([gaps[:1], gaps]) + np.concatenate([gaps, gaps[-1:]])) / 2)
 
 
 @cache
@@ -178,10 +178,10 @@ def interpolation_operator(source_nm: Float64Array, target_nm: Float64Array, kin
     operator[rows, index] = basis[:, 0]
     operator[rows, index + 1] += basis[:, 1]
     slopes = _spline_slope_operator(source)
-    return operator + basis[:, 2, None] * slopes[index] + basis[:, 3, None] * slopes[index + 1]
+    return np.asarray(operator + basis[:, 2, None] * slopes[index] + basis[:, 3, None] * slopes[index + 1])
 
 
-def _checked_order(bands: Float64Array) -> np.ndarray:
+def _checked_order(bands: Float64Array) -> IntArray:
     if bands.ndim != 1 or len(bands) == 0 or not np.all(np.isfinite(bands)):
         raise SpectrumError(
             "band wavelengths must be a list of finite numbers", remedy="give one wavelength in nm per band"
@@ -195,7 +195,7 @@ def _checked_order(bands: Float64Array) -> np.ndarray:
     return order
 
 
-def _hermite(knots: Float64Array, at: Float64Array) -> tuple[np.ndarray, Float64Array]:
+def _hermite(knots: Float64Array, at: Float64Array) -> tuple[IntArray, Float64Array]:
     """Interval index (n,) and cubic Hermite basis (n, 4): values left, right; slopes left, right."""
     index = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
     width = knots[index + 1] - knots[index]

@@ -12,32 +12,32 @@ from typing import Protocol
 
 import numpy as np
 
-from spectral_core.arrays import Float64Array, frozen
+from spectral_core.arrays import Float64Array, FloatArray, frozen
 from spectral_core.errors import DisplayError
 
 
 class DisplayModel(Protocol):
     """What every display model can do; arrays are (..., 3)."""
 
-    def forward(self, codes: Float64Array) -> Float64Array:
+    def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ of device codes."""
 
-    def inverse(self, XYZ: Float64Array) -> Float64Array:
+    def inverse(self, XYZ: FloatArray) -> Float64Array:
         """Device codes of XYZ, not clipped."""
 
-    def linear(self, XYZ: Float64Array) -> Float64Array:
+    def linear(self, XYZ: FloatArray) -> Float64Array:
         """Linear device RGB of XYZ, not clipped; 1 is full drive."""
 
-    def encode(self, linear: Float64Array) -> Float64Array:
+    def encode(self, linear: FloatArray) -> Float64Array:
         """Device codes of linear device RGB, not clipped."""
 
 
-def signed_power(values: Float64Array, exponent: Float64Array | float) -> Float64Array:
+def signed_power(values: FloatArray, exponent: Float64Array | float) -> Float64Array:
     """sign(v) |v|^exponent: a power that never gives NaN."""
     return np.asarray(np.sign(values) * np.abs(values) ** exponent)
 
 
-def srgb_encode(linear: Float64Array) -> Float64Array:
+def srgb_encode(linear: FloatArray) -> Float64Array:
     """SRGB codes of linear sRGB (IEC 61966-2-1), by odd symmetry below zero, not clipped.
 
     The type of the input is kept: float32 stays float32.
@@ -48,7 +48,7 @@ def srgb_encode(linear: Float64Array) -> Float64Array:
     return np.asarray(np.sign(linear) * np.where(magnitude <= 0.0031308, 12.92 * magnitude, curve))
 
 
-def srgb_decode(codes: Float64Array) -> Float64Array:
+def srgb_decode(codes: FloatArray) -> Float64Array:
     """Linear sRGB of sRGB codes (IEC 61966-2-1), by odd symmetry below zero."""
     magnitude = np.abs(codes)
     curve = ((magnitude + 0.055) / 1.055) ** 2.4
@@ -86,19 +86,19 @@ class GammaMatrix:
         if np.linalg.cond(self.matrix) > 1e8:
             raise DisplayError("'matrix' cannot be inverted: its primaries lie on a line", remedy="correct the profile")
 
-    def forward(self, codes: Float64Array) -> Float64Array:
+    def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3) of device codes (..., 3)."""
         return np.asarray(signed_power(np.asarray(codes), self.gamma) @ self.matrix.T + self.black_XYZ)
 
-    def linear(self, XYZ: Float64Array) -> Float64Array:
+    def linear(self, XYZ: FloatArray) -> Float64Array:
         """Linear device RGB (..., 3) of XYZ (..., 3), not clipped."""
         return np.asarray((np.asarray(XYZ) - self.black_XYZ) @ np.linalg.inv(self.matrix).T)
 
-    def encode(self, linear: Float64Array) -> Float64Array:
+    def encode(self, linear: FloatArray) -> Float64Array:
         """Device codes (..., 3) of linear device RGB (..., 3), not clipped."""
         return signed_power(np.asarray(linear), 1 / self.gamma)
 
-    def inverse(self, XYZ: Float64Array) -> Float64Array:
+    def inverse(self, XYZ: FloatArray) -> Float64Array:
         """Device codes (..., 3) of XYZ (..., 3), not clipped."""
         return self.encode(self.linear(XYZ))
 
@@ -109,18 +109,18 @@ class SRGBCurve:
 
     matrix: Float64Array
 
-    def forward(self, codes: Float64Array) -> Float64Array:
+    def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3) of device codes (..., 3)."""
         return np.asarray(srgb_decode(np.asarray(codes)) @ self.matrix.T)
 
-    def linear(self, XYZ: Float64Array) -> Float64Array:
+    def linear(self, XYZ: FloatArray) -> Float64Array:
         """Linear sRGB (..., 3) of XYZ (..., 3), not clipped."""
         return np.asarray(np.asarray(XYZ) @ np.linalg.inv(self.matrix).T)
 
-    def encode(self, linear: Float64Array) -> Float64Array:
+    def encode(self, linear: FloatArray) -> Float64Array:
         """SRGB codes (..., 3) of linear sRGB (..., 3), not clipped."""
         return srgb_encode(np.asarray(linear))
 
-    def inverse(self, XYZ: Float64Array) -> Float64Array:
+    def inverse(self, XYZ: FloatArray) -> Float64Array:
         """Device codes (..., 3) of XYZ (..., 3), not clipped."""
         return self.encode(self.linear(XYZ))

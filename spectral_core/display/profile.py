@@ -9,13 +9,16 @@ from typing import Any
 
 import numpy as np
 
-from spectral_core.arrays import Float64Array
+from spectral_core.arrays import BoolArray, Float64Array, FloatArray
 from spectral_core.display.models import DisplayModel, GammaMatrix, SRGBCurve
 from spectral_core.errors import DisplayError
 from spectral_core.files import atomic_path
 
 _FORMAT = "spectral-booth display profile"
 _VERSION = 1
+# CIE D65's table differs from sRGB's rounded white point by 9e-5 in linear RGB: the display's own
+# white is not out of its gamut.
+GAMUT_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -36,22 +39,22 @@ class DisplayProfile:
     model: DisplayModel
     source: str = ""
 
-    def to_XYZ(self, codes: Float64Array) -> Float64Array:
+    def to_XYZ(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3), white Y = 1, of device codes (..., 3) from 0 to 1."""
         return self.model.forward(codes)
 
-    def to_codes(self, XYZ: Float64Array) -> Float64Array:
+    def to_codes(self, XYZ: FloatArray) -> Float64Array:
         """Device codes (..., 3) of XYZ (..., 3), not clipped; outside 0..1 is out of gamut."""
         return self.model.inverse(XYZ)
 
-    def to_linear(self, XYZ: Float64Array) -> Float64Array:
+    def to_linear(self, XYZ: FloatArray) -> Float64Array:
         """Linear device RGB (..., 3) of XYZ (..., 3), not clipped."""
         return self.model.linear(XYZ)
 
 
-def in_gamut(values: Float64Array, tolerance: float = 1e-6) -> np.ndarray:
-    """True (...,) where all channels of (..., 3) lie in 0..1; the tolerance is that of float32."""
-    return np.asarray(((values >= -tolerance) & (values <= 1 + tolerance)).all(axis=-1))
+def in_gamut(values: FloatArray) -> BoolArray:
+    """True (...,) where all channels of (..., 3) lie in 0..1."""
+    return np.asarray(((values >= -GAMUT_TOLERANCE) & (values <= 1 + GAMUT_TOLERANCE)).all(axis=-1))
 
 
 def write_profile(profile: DisplayProfile, path: Path) -> None:

@@ -34,4 +34,5 @@ def bake_document(result: BakeResult) -> Document:
         "seconds": result.seconds,
         "pixels": result.pixels,
         "bands": result.bands,
+        "peak_memory_MB": result.peak_memory_MB,
     }

@@ -10,15 +10,17 @@ from __future__ import annotations
 import math
 import zipfile
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 
-from spectral_core.arrays import Float32Array, frozen
+from spectral_core.arrays import Float32Array, Float64Array, frozen
 from spectral_core.errors import SpectrumError, TextureError
 from spectral_core.spectra import read_text
 from spectral_core.textures.base import HyperspectralTexture, Kind
 
+# NumPy types these functions in some versions only.
+_FORMAT: Any = np.lib.format
 _LARGEST_SIDE = 1 << 20
 _LARGEST_BANDS = 10_000
 
@@ -77,7 +79,9 @@ class NpzTexture(HyperspectralTexture):
         self.wavelengths_nm = frozen(_checked_wavelengths(wavelengths, bands, path))
         self.warnings = ()
 
-    def _read_header(self, archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[tuple[int, ...], bool, np.dtype]:
+    def _read_header(
+        self, archive: zipfile.ZipFile, info: zipfile.ZipInfo
+    ) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
         with archive.open(info) as stream:
             shape, fortran, dtype = _header(stream, self._path)
             _check_cube(shape, dtype, self._path)
@@ -90,7 +94,8 @@ class NpzTexture(HyperspectralTexture):
         try:
             if self._stream is None or first < self._next_row:
                 self.close()
-                self._stream = zipfile.ZipFile(self._path).open(f"{self._member}.npy")
+                archive = zipfile.ZipFile(self._path)  # noqa: SIM115: kept open from one tile to the next
+                self._stream = archive.open(f"{self._member}.npy")
                 _header(self._stream, self._path)
                 self._next_row = 0
             self._stream.seek((first - self._next_row) * row_bytes, 1)
@@ -111,20 +116,20 @@ class NpzTexture(HyperspectralTexture):
             self._stream = None
 
 
-def _header(stream: IO[bytes], path: Path) -> tuple[tuple[int, ...], bool, np.dtype]:
+def _header(stream: IO[bytes], path: Path) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     """Shape, order and type of an array file, without evaluating or allocating anything of it."""
     try:
-        version = np.lib.format.read_magic(stream)
-        if version == (1, 0):
-            return np.lib.format.read_array_header_1_0(stream)
-        return np.lib.format.read_array_header_2_0(stream)
+        version = _FORMAT.read_magic(stream)
+        read = _FORMAT.read_array_header_1_0 if version == (1, 0) else _FORMAT.read_array_header_2_0
+        shape, fortran, dtype = read(stream)
     except (ValueError, EOFError) as error:
         raise TextureError(
             f"has a damaged NumPy header ({str(error).splitlines()[0]})", where=path, remedy="write it again"
         ) from None
+    return shape, fortran, dtype
 
 
-def _check_cube(shape: tuple[int, ...], dtype: np.dtype, path: Path) -> None:
+def _check_cube(shape: tuple[int, ...], dtype: np.dtype[Any], path: Path) -> None:
     if len(shape) != 3 or not all(0 < side <= _LARGEST_SIDE for side in shape) or shape[2] > _LARGEST_BANDS:
         raise TextureError(f"holds an array of shape {shape}", where=path, remedy="give (height, width, bands)")
     if dtype.hasobject or dtype.kind != "f":
@@ -135,7 +140,7 @@ def _check_cube(shape: tuple[int, ...], dtype: np.dtype, path: Path) -> None:
         )
 
 
-def _check_size(available: int, shape: tuple[int, ...], dtype: np.dtype, path: Path) -> None:
+def _check_size(available: int, shape: tuple[int, ...], dtype: np.dtype[Any], path: Path) -> None:
     promised = math.prod(shape) * dtype.itemsize
     if available < promised:
         raise TextureError(
@@ -157,7 +162,7 @@ def _cube_member(members: dict[str, zipfile.ZipInfo], path: Path) -> tuple[str, 
     )
 
 
-def _small_array(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], path: Path) -> np.ndarray:
+def _small_array(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], path: Path) -> Float64Array:
     info = members.get("wavelengths_nm")
     if info is None:
         raise TextureError("lacks the array 'wavelengths_nm'", where=path, remedy="save one wavelength in nm per band")
@@ -165,7 +170,7 @@ def _small_array(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], 
         raise TextureError("'wavelengths_nm' is far too large", where=path, remedy="save one wavelength in nm per band")
     with archive.open(info) as stream:
         try:
-            return np.asarray(np.lib.format.read_array(stream, allow_pickle=False), dtype=np.float64)
+            return np.asarray(_FORMAT.read_array(stream, allow_pickle=False), dtype=np.float64)
         except (ValueError, TypeError) as error:
             raise TextureError(
                 f"'wavelengths_nm' cannot be read ({str(error).splitlines()[0]})",
@@ -174,7 +179,7 @@ def _small_array(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], 
             ) from None
 
 
-def _wavelengths_beside(path: Path, bands: int) -> np.ndarray:
+def _wavelengths_beside(path: Path, bands: int) -> Float64Array:
     beside = path.with_name(f"{path.stem}.wavelengths.csv")
     if not beside.is_file():
         raise TextureError(
@@ -193,7 +198,7 @@ def _wavelengths_beside(path: Path, bands: int) -> np.ndarray:
     return _checked_wavelengths(np.array(values), bands, beside)
 
 
-def _checked_wavelengths(wavelengths: np.ndarray, bands: int, path: Path) -> np.ndarray:
+def _checked_wavelengths(wavelengths: Float64Array, bands: int, path: Path) -> Float64Array:
     if wavelengths.shape != (bands,):
         raise TextureError(
             f"{wavelengths.size} wavelengths for {bands} bands", where=path, remedy="give one wavelength per band"

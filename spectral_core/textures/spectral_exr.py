@@ -46,7 +46,8 @@ class SpectralExrTexture(HyperspectralTexture):
         wavelengths, self._channels = zip(*sorted(channels), strict=True)
         if len(set(wavelengths)) < len(wavelengths):
             raise TextureError("a wavelength occurs twice", where=path, remedy="keep one layer of the file")
-        self.wavelengths_nm = frozen(wavelengths)
+        # Names have six decimals: what the unit's conversion adds beyond them is noise.
+        self.wavelengths_nm = frozen(np.round(wavelengths, 6))
         self.height, self.width = int(spec.height), int(spec.width)
         self._origin_y = int(spec.y)
         self._tile_rows = int(spec.tile_height)

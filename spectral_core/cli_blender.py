@@ -1,0 +1,123 @@
+"""Commands of ``spectral-booth`` that need Blender: build, render, verify, demo."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import click
+
+from spectral_core.blender_process import run_verb
+from spectral_core.console import Document, emit, facts, progress_bar, table
+from spectral_core.demo import run_demo
+from spectral_core.options import as_json
+from spectral_core.scene import load_scene
+
+_PATH = click.Path(path_type=Path)
+# Half an 8-bit level: below it, what is rendered and what is right round to the same or the next code.
+_LIMIT = 0.5
+
+
+@click.command()
+@click.argument("scene", type=_PATH)
+@click.option("-o", "--output", type=_PATH, required=True, help="the .blend to write")
+@as_json
+def build(scene: Path, output: Path, json: bool) -> None:
+    """Build the .blend of a SCENE (TOML) and calibrate its white."""
+    load_scene(scene)  # a wrong key is told at once, before Blender starts
+    with progress_bar(f"building {scene.name}") as progress:
+        document = run_verb(["build", str(scene), "-o", str(output)], progress)
+    emit(document, json, lambda console: console.print(facts(document)))
+
+
+@click.command()
+@click.argument("file", type=_PATH)
+@click.option("--light", metavar="LIGHT", help="the scene's own if left out")
+@click.option("--level", type=click.Choice(["0", "1", "2"]), help="the scene's own if left out")
+@click.option("--stereo", is_flag=True, help="both eyes side by side")
+@click.option("-o", "--output", type=_PATH, required=True, help="the PNG to write")
+@as_json
+def render(file: Path, light: str | None, level: str | None, stereo: bool, output: Path, json: bool) -> None:
+    """Render a built FILE (.blend) under a light to PNG."""
+    arguments = ["render", str(file), "-o", str(output)]
+    arguments += ["--light", light] if light else []
+    arguments += ["--level", level] if level else []
+    arguments += ["--stereo"] if stereo else []
+    with progress_bar(f"rendering {file.name}") as progress:
+        document = run_verb(arguments, progress)
+    emit(document, json, lambda console: console.print(facts(document)))
+
+
+@click.command()
+@click.argument("file", type=_PATH)
+@click.option("--light", "lights", metavar="LIGHT", multiple=True, help="repeat for several; all if left out")
+@click.option(
+    "--level", "levels", type=click.Choice(["0", "1", "2"]), multiple=True, help="repeat for several; all if left out"
+)
+@click.option("--images", type=_PATH, help="keep the renders in this folder")
+@click.option("--report", type=_PATH, help="write an HTML report there")
+@click.option(
+    "--limit", type=float, default=_LIMIT, show_default=True, help="largest 8-bit difference allowed at level 2"
+)
+@as_json
+def verify(
+    file: Path, lights: Sequence[str], levels: Sequence[str], images: Path | None, report: Path | None, limit: float,
+    json: bool,
+) -> int:  # fmt: skip
+    """Render a built FILE (.blend) and compare its pixels with theory.
+
+    Ends with 1 if level 2 differs by more than --limit over the patches in gamut.
+    """
+    arguments = ["verify", str(file)]
+    arguments += [part for light in lights for part in ("--light", light)]
+    arguments += [part for level in levels for part in ("--level", level)]
+    arguments += ["--images", str(images)] if images else []
+    with progress_bar(f"verifying {file.name}") as progress:
+        document = run_verb(arguments, progress)
+    failed = [each["name"] for each in document["lights"] if _largest(each) > limit]
+    document = {**document, "limit": limit, "failed": failed}
+    emit(document, json, lambda console: console.print(table(_COLUMNS, verify_rows(document), document["scene"])))
+    return 1 if failed else 0
+
+
+@click.command()
+@click.option("-o", "--output", type=_PATH, default=Path("out/demo"), show_default=True, help="folder for everything")
+@as_json
+def demo(output: Path, json: bool) -> None:
+    """Build the booth and the chart, render them under six lights, verify, and report."""
+    with progress_bar("demo") as progress:
+        document = run_demo(output, progress)
+    emit(document, json, lambda console: console.print(facts(document)))
+
+
+def add_blender_commands(group: click.Group) -> None:
+    """Add this module's commands to the program."""
+    for command in (build, render, verify, demo):
+        group.add_command(command)
+
+
+_COLUMNS = ("light", "level", "R mean", "G mean", "B mean", "max (8-bit)", "dE00 mean", "dE00 max", "seconds")
+
+
+def verify_rows(document: Document) -> list[list[object]]:
+    """One row per light and level for the terminal; differences over all patches, clipped."""
+    rows: list[list[object]] = []
+    for light in document["lights"]:
+        for level in ("level0", "level1", "level2"):
+            if level not in light:
+                continue
+            result = light[level]
+            rgb = [result["rgb8"][channel] for channel in "RGB"]
+            means = [each["mean"] for each in rgb]
+            seconds = result["switch_seconds"] + result["render_seconds"]
+            dE00 = result["dE00"]
+            rows.append(
+                [light["name"], level[-1], *means, max(each["max"] for each in rgb), dE00["mean"], dE00["max"], seconds]
+            )
+    return rows
+
+
+def _largest(light: Document) -> float:
+    """The largest 8-bit difference of a light at level 2 in gamut, 0 if level 2 was not asked for."""
+    result = light.get("level2")
+    return max(each["max"] for each in result["rgb8_in_gamut"].values()) if result else 0.0

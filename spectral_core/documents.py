@@ -1,0 +1,214 @@
+"""Results as the JSON documents of the public contract, for the commands that need no Blender."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from spectral_core import light_design, standards, weights
+from spectral_core.arrays import Float64Array
+from spectral_core.display import DisplayProfile, srgb
+from spectral_core.display.profile import in_gamut
+from spectral_core.errors import LightError, TextureError
+from spectral_core.lights import Light, LightQuality, builtin_names
+from spectral_core.report.documents import Document, bake_document
+from spectral_core.spectra import Spectra
+from spectral_core.textures import HyperspectralTexture
+
+__all__ = [
+    "bake_document",
+    "design",
+    "design_table",
+    "light_document",
+    "lights_document",
+    "long_lists",
+    "pixel_document",
+    "reflectance_document",
+    "target_chromaticity",
+    "texture_document",
+]
+
+# Two statements of one chromaticity, xy and CCT, may differ by what four decimals of xy can say.
+_CCT_AGREEMENT = 0.01
+_LONGEST_SHOWN_LIST = 8
+
+
+def light_document(light: Light, luminance: float, profile: DisplayProfile, observer: str) -> Document:
+    """`light`: XYZ has Y = `luminance`; linear RGB is 1 at luminance 100."""
+    XYZ = light.XYZ(observer) * luminance
+    linear = profile.to_linear(XYZ / 100)
+    return {
+        "name": light.name,
+        "xy": light.xy(observer).tolist(),
+        "XYZ": XYZ.tolist(),
+        **_quality(light.quality()),
+        "linear_rgb": linear.tolist(),
+        "rgb_8bit": (255 * profile.model.encode(linear)).tolist(),
+        "in_gamut": bool(in_gamut(linear)),
+        "warnings": list(light.warnings),
+    }
+
+
+def lights_document() -> Document:
+    """`lights`: every built-in light."""
+    entries = []
+    for name in builtin_names():
+        light = Light.builtin(name)
+        quality = light.quality()
+        entries.append(
+            {"name": name, "kind": light.kind, "xy": light.xy().tolist(), "cct_K": quality.cct_K, "rf": quality.rf}
+        )
+    return {"lights": entries}
+
+
+def target_chromaticity(match: str | None, xy: str | None, cct_K: float | None, observer: str) -> Float64Array:
+    """The chromaticity (2,) that a design shall have, from a light, from ``x,y`` or from a CCT.
+
+    Raises
+    ------
+    LightError
+        If they contradict each other or cannot be read.
+    """
+    if match is not None and (xy is not None or cct_K is not None):
+        raise LightError("--match, --xy and --cct all say the chromaticity", remedy="give one of them")
+    if xy is not None:
+        target = _parse_xy(xy)
+        actual, _ = standards.cct_and_duv(target)
+        if cct_K is not None and not abs(actual / cct_K - 1) <= _CCT_AGREEMENT:
+            raise LightError(f"xy {xy} has a CCT of {actual:.0f} K, not {cct_K:g} K", remedy="give one of the two")
+        return target
+    if cct_K is not None:
+        return standards.planckian_or_daylight_xy(cct_K)
+    return Light.load(match or "D65").xy(observer)
+
+
+def design(
+    target: Float64Array, peak: float | None, leds: int | None, rf: float | None, observer: str
+) -> tuple[Light, Document]:
+    """`light-design`: the light and its document."""
+    if peak is not None:
+        light = light_design.two_peak_metamer(target, peak, observer)
+    else:
+        light = light_design.led_mixture(target, float(rf or 0.0), int(leds or 0), observer)
+    powers, _ = design_table(light)
+    quality = light.quality()
+    document = {
+        "name": light.name,
+        "wavelengths_nm": light.wavelengths_nm.tolist(),
+        "powers": powers.tolist(),
+        "xy": light.xy(observer).tolist(),
+        **_quality(quality),
+        "delta_xy": float(np.abs(light.xy(observer) - target).max()),
+    }
+    return light, document
+
+
+def design_table(light: Light) -> tuple[Float64Array, bool]:
+    """Powers (n,) to tabulate, and whether they are those of lines rather than of a curve."""
+    is_lines = bool(light.lines.all())
+    if is_lines:
+        return light.powers, True
+    return np.asarray(light.powers / weights.quadrature_widths(light.wavelengths_nm)), False
+
+
+def reflectance_document(spectra: Spectra, light: Light, profile: DisplayProfile, observer: str) -> Document:
+    """`reflectance`: colours of a library under a light, Lab relative to the light."""
+    factors = light.weighting_factors(spectra.wavelengths_nm, observer)
+    XYZ = spectra.values @ factors.matrix
+    Lab = standards.XYZ_to_Lab(XYZ, factors.white_XYZ)
+    codes = profile.to_codes(XYZ)
+    colours = [
+        {
+            "name": name,
+            "XYZ": XYZ[index].tolist(),
+            "Lab": Lab[index].tolist(),
+            "rgb_8bit": (255 * codes[index]).tolist(),
+            "in_gamut": bool(in_gamut(codes[index])),
+        }
+        for index, name in enumerate(spectra.names)
+    ]
+    warnings = [*spectra.warnings, *light.warnings, *_extension(factors)]
+    return {"light": light.name, "colours": colours, "warnings": warnings}
+
+
+def texture_document(texture: HyperspectralTexture) -> Document:
+    """`texture info`."""
+    return {
+        "name": texture.name,
+        "format": texture.format,
+        "width": texture.width,
+        "height": texture.height,
+        "bands": texture.bands,
+        "wavelengths_nm": [float(texture.wavelengths_nm[0]), float(texture.wavelengths_nm[-1])],
+        "step_nm": texture.step_nm,
+        "kind": texture.kind,
+        "scale": texture.scale,
+        "warnings": list(texture.warnings),
+    }
+
+
+def pixel_document(
+    texture: HyperspectralTexture, path: Path, x: int, y: int, light: Light | None, observer: str
+) -> Document:
+    """`texture pixel`.
+
+    Raises
+    ------
+    TextureError
+        If the pixel is outside, or a colour is asked of something that is not reflectance.
+    """
+    if not (0 <= x < texture.width and 0 <= y < texture.height):
+        size = f"{texture.width} x {texture.height}"
+        raise TextureError(f"has no pixel {x}, {y}", where=path, remedy=f"it is {size}; x and y start at 0")
+    spectrum = texture.pixel(x, y)
+    document: Document = {
+        "wavelengths_nm": texture.wavelengths_nm.tolist(),
+        "reflectance": spectrum.tolist(),
+        "kind": texture.kind,
+        "warnings": list(texture.warnings),
+    }
+    if not np.isfinite(spectrum).all():
+        raise TextureError(
+            f"pixel {x}, {y} holds a value that is no finite number", where=path, remedy="repair the capture"
+        )
+    if light is not None:
+        if texture.kind != "reflectance":
+            raise TextureError(f"holds {texture.kind}, which is already lit", where=path, remedy="leave --light out")
+        factors = light.weighting_factors(texture.wavelengths_nm, observer)
+        XYZ = spectrum @ factors.matrix
+        document["XYZ"] = XYZ.tolist()
+        document["rgb_8bit"] = (255 * srgb().to_codes(XYZ)).tolist()
+        document["warnings"] += _extension(factors)
+    return document
+
+
+def long_lists(document: Document) -> list[str]:
+    """Keys whose lists are too long to show to people."""
+    return [key for key, value in document.items() if isinstance(value, list) and len(value) > _LONGEST_SHOWN_LIST]
+
+
+def _quality(quality: LightQuality) -> dict[str, Any]:
+    return {"cct_K": quality.cct_K, "duv": quality.duv, "rf": quality.rf, "ra": quality.ra}
+
+
+def _extension(factors: weights.WeightingFactors) -> list[str]:
+    """One warning if the ends of the reflectance carry weight that was never measured."""
+    if factors.extended < 1e-4:
+        return []
+    low, high = factors.wavelengths_nm.min(), factors.wavelengths_nm.max()
+    return [
+        f"bands from {low:g} to {high:g} nm: {factors.extended_below:.2%} below and {factors.extended_above:.2%} above "
+        "of the white's X, Y or Z rest on the repeated end values (ASTM E308)"
+    ]
+
+
+def _parse_xy(text: str) -> Float64Array:
+    try:
+        x, y = (float(part) for part in text.split(","))
+    except ValueError:
+        raise LightError(f"'{text}' is no chromaticity", remedy="give --xy 0.3127,0.3290") from None
+    if not (0 < x < 1 and 0 < y < 1 and x + y < 1):
+        raise LightError(f"'{text}' is no chromaticity of a real light", remedy="give --xy 0.3127,0.3290")
+    return np.array([x, y])
