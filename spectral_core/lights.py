@@ -160,11 +160,12 @@ class Light:
         return LightQuality(cct, duv, standards.fidelity_index(grid, powers), standards.rendering_index(grid, powers))
 
     def _index_table(self) -> tuple[Float64Array, Float64Array]:
-        """The evenly spaced table that Rf and Ra are defined for: the own one where that is even and
-        at most 5 nm; otherwise 1 nm, each line shared between its two neighbours by distance.
+        """The table that Rf and Ra are computed from: the light's own where it is one of 1 or 5 nm
+        from 380 to 780 nm, as CIE 224 asks; otherwise 1 nm, interpolated linearly and dark beyond
+        its ends, each line shared between its two neighbours by distance.
         """
         nm = self.wavelengths_nm
-        if not self.lines.any() and len(nm) > 2 and np.ptp(np.diff(nm)) < 1e-9 and nm[1] - nm[0] <= COARSEST_STEP_NM:
+        if not self.lines.any() and _is_standard_grid(nm):
             return nm, self.powers
         table = ~self.lines
         powers = np.zeros_like(_INDEX_GRID_NM)
@@ -224,6 +225,11 @@ _ALIASES = {
     "lowpressuresodium": "LPS",
     "highpressuresodium": "HPS",
 }
+
+
+def _is_standard_grid(nm: Float64Array) -> bool:
+    inside = nm[(nm >= _INDEX_GRID_NM[0]) & (nm <= _INDEX_GRID_NM[-1])]
+    return any(np.array_equal(inside, np.arange(_INDEX_GRID_NM[0], _INDEX_GRID_NM[-1] + 1, step)) for step in (1, 5))
 
 
 def _key(name: str) -> str:

@@ -1,0 +1,107 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.fixture
+def document(run: Run) -> Callable[..., dict[str, Any]]:
+    """The one JSON object of a command that succeeds."""
+
+    def call(*arguments: object) -> dict[str, Any]:
+        code, out, _ = run(*arguments, "--json")
+        assert code == 0
+        parsed: dict[str, Any] = json.loads(out)
+        return parsed
+
+    return call
+
+
+def test_light(document: Callable[..., dict[str, Any]]) -> None:
+    found = document("light", "D65", "--luminance", "85")
+    assert set(found) >= {
+        "name",
+        "xy",
+        "XYZ",
+        "cct_K",
+        "duv",
+        "rf",
+        "ra",
+        "linear_rgb",
+        "rgb_8bit",
+        "in_gamut",
+        "warnings",
+    }
+    np.testing.assert_allclose(found["rgb_8bit"], 237, atol=0.6)
+    assert found["XYZ"][1] == pytest.approx(85)
+    assert found["in_gamut"] is True
+    assert document("light", "D65")["in_gamut"] is True
+    assert document("light", "A", "--luminance", "85")["in_gamut"] is False
+    vive = document("light", "D65", "--profile", "htc-vive-2021")
+    assert vive["linear_rgb"][0] == pytest.approx(1.04, abs=0.005)  # just outside, as published
+
+
+def test_lights(document: Callable[..., dict[str, Any]]) -> None:
+    lights = {each["name"]: each for each in document("lights")["lights"]}
+    assert {"D65", "Philips TL-84", "two-peaks-d65", "d65-simulator", "LPS"} <= set(lights)
+    assert lights["LPS"]["kind"] == "measured"
+    assert all(set(each) == {"name", "kind", "xy", "cct_K", "rf"} for each in lights.values())
+
+
+def test_light_design(document: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+    path = tmp_path / "two.csv"
+    found = document("light-design", "--match", "D65", "--peak", "456", "-o", path)
+    assert set(found) >= {"wavelengths_nm", "powers", "xy", "cct_K", "rf", "delta_xy"}
+    assert found["delta_xy"] < 1e-6
+    assert found["wavelengths_nm"][1] == pytest.approx(569, abs=0.05)
+    np.testing.assert_allclose(document("light", path)["xy"], document("light", "D65")["xy"], atol=1e-9)
+    leds = document("light-design", "--leds", "6", "--rf", "88", "--xy", "0.3107,0.3344", "--cct", "6568")
+    assert leds["rf"] == pytest.approx(88, abs=1e-3)
+    assert leds["cct_K"] == pytest.approx(6568, abs=30)
+
+
+def test_reflectance(document: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("nm;white;grey\n380;1;0.2\n780;1;0.2\n")
+    white, grey = document("reflectance", path, "--light", "A")["colours"]
+    assert white["name"] == "white"
+    np.testing.assert_allclose(white["Lab"], [100, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(np.array(grey["XYZ"]) / white["XYZ"], 0.2)
+    assert len(document("reflectance", "colorchecker")["colours"]) == 24
+
+
+def test_texture_and_bake(document: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+    path = tmp_path / "t.npz"
+    cube = np.random.default_rng(0).uniform(0, 1, (5, 7, 41)).astype(np.float32)
+    np.savez(path, reflectance=cube, wavelengths_nm=np.arange(380.0, 781, 10))
+    info = document("texture", "info", path)
+    assert (info["width"], info["height"], info["bands"], info["step_nm"]) == (7, 5, 41, 10)
+    pixel = document("texture", "pixel", path, 6, 4, "--light", "D65")
+    np.testing.assert_array_equal(pixel["reflectance"], cube[4, 6])
+    baked = document("bake", path, "--light", "D65", "--light", "A", "-o", tmp_path / "out", "--format", "png8")
+    assert [each["light"] for each in baked["outputs"]] == ["D65", "A"]
+    assert all(Path(each["path"]).is_file() for each in baked["outputs"])
+    assert set(baked) >= {"outputs", "seconds", "pixels", "bands", "peak_memory_MB"}
+
+
+@pytest.mark.parametrize(
+    "command", [["light", "D65"], ["lights"], ["reflectance", "colorchecker"], ["light-design", "--peak", "450"]]
+)
+def test_people_get_a_table(run: Run, command: list[str]) -> None:
+    code, out, _ = run(*command)
+    assert code == 0
+    assert "│" in out
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_help_and_version(run: Run) -> None:
+    assert "Usage" in run("--help")[1]
+    for command in ("light", "bake", "verify", "demo"):
+        assert "--json" in run(command, "--help")[1]
