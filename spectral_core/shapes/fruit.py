@@ -46,7 +46,9 @@ def apple(size: Size) -> Mesh:
     low = np.clip(-along, 0, 1)[:, None] ** 3
     lobes = np.cos(longitudes() * _SEPALS)
     swell = _irregular(0.015, 7) + 0.04 * low * lobes * np.cos(angle)[:, None]
-    return swept(np.stack([width, height], axis=1), size, swell=swell, lift=-0.03 * low * lobes * np.cos(angle)[:, None])
+    return swept(
+        np.stack([width, height], axis=1), size, swell=swell, lift=-0.03 * low * lobes * np.cos(angle)[:, None]
+    )
 
 
 def orange(size: Size) -> Mesh:
@@ -79,7 +81,9 @@ def calyx(size: Size) -> Mesh:
     arch = 1.2 * reach * (1 - reach) + 0.25 * reach**3
     thickness = 0.03 * along[:, None] * (1 - 0.5 * reach)
     stalk = 0.60 * np.exp(-((reach / 0.10) ** 4)) * (along[:, None] > 0)
-    surface = swept(np.stack([np.ones_like(angle), np.zeros_like(angle)], axis=1), (2.0, 2.0, 1.0), reach, arch + thickness + stalk)
+    surface = swept(
+        np.stack([np.ones_like(angle), np.zeros_like(angle)], axis=1), (2.0, 2.0, 1.0), reach, arch + thickness + stalk
+    )
     return Mesh(fitted(surface.vertices, size), surface.faces, surface.uvs, smooth=True)
 
 

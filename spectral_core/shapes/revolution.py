@@ -35,7 +35,11 @@ def longitudes() -> Float64Array:
 
 
 def swept(
-    profile: Float64Array, size: Size, swell: Float64Array | None = None, lift: Float64Array | None = None, axis: str = "z"
+    profile: Float64Array,
+    size: Size,
+    swell: Float64Array | None = None,
+    lift: Float64Array | None = None,
+    axis: str = "z",
 ) -> Mesh:
     """A closed surface swept round an axis and fitted into `size`.
 
@@ -43,6 +47,8 @@ def swept(
     ----------
     profile
         (RINGS + 1, 2), distance from the axis and height, from the lower pole to the upper.
+    size
+        Bounding box (x, y, z).
     swell
         (RINGS + 1, SEGMENTS), factor of the distance from the axis: lobes and irregularities.
     lift

@@ -38,7 +38,9 @@ def cube(size: Size) -> Mesh:
     half = np.asarray(size) / 2
     inset = half - _CHAMFER * min(size)
     corners = list(product((-1, 1), repeat=3))
-    vertices = np.array([[s * (half if i == a else inset)[i] for i, s in enumerate(c)] for c in corners for a in range(3)])
+    vertices = np.array(
+        [[s * (half if i == a else inset)[i] for i, s in enumerate(c)] for c in corners for a in range(3)]
+    )
     index = {(corner, axis): 3 * i + axis for i, corner in enumerate(corners) for axis in range(3)}
     sets = [{index[c, a] for c in corners if c[a] == s} for a in range(3) for s in (-1, 1)]
     for a, b in ((0, 1), (0, 2), (1, 2)):
@@ -46,7 +48,7 @@ def cube(size: Size) -> Mesh:
             sets.append({index[c, axis] for c in corners if (c[a], c[b]) == (s, t) for axis in (a, b)})
     sets += [{index[c, a] for a in range(3)} for c in corners]
     faces = tuple(_wound(vertices, sorted(each)) for each in sets)
-    return _flat(vertices + [0, 0, half[2]], faces)
+    return _flat(vertices + np.array([0, 0, half[2]]), faces)
 
 
 def prism(size: Size) -> Mesh:

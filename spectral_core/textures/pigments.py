@@ -2,9 +2,10 @@
 
 No capture stands behind them: a few maps of pigment concentration, the pigments' absorption and
 the theory of Kubelka and Munk give the reflectance of every pixel. The bands' positions are
-published; their widths and strengths, and all concentrations, are set by hand so that the
-spectra look like measured food (floor of 2 to 6 % where pigments absorb, plateau of 55 to 75 %
-above, the red edge of chlorophyll), and are no measurement.
+published, those of orange and red carotenoids in solution and here moved to the red as tissue
+does. Their widths and strengths, and all concentrations, are set by hand so that the spectra look
+like measured food (floor of 2 to 6 % where pigments absorb, plateau of 55 to 75 % above, the red
+edge of chlorophyll), and are no measurement.
 """
 
 from __future__ import annotations
@@ -58,7 +59,15 @@ class Pigment:
 PIGMENTS: dict[str, Pigment] = {
     # In the living leaf the red band of chlorophyll a lies at 676 nm (662 in acetone).
     "chlorophyll a": Pigment(
-        ((384, 22, 0.75), (413, 15, 0.80), (435, 12, 1.00), (585, 24, 0.10), (623, 17, 0.20), (676, 11.5, 0.72), (700, 14, 0.06)),
+        (
+            (384, 22, 0.75),
+            (413, 15, 0.80),
+            (435, 12, 1.00),
+            (585, 24, 0.10),
+            (623, 17, 0.20),
+            (676, 11.5, 0.72),
+            (700, 14, 0.06),
+        ),
         "Hoepffner & Sathyendranath 1991, Gaussian bands in vivo",
     ),
     "chlorophyll b": Pigment(
@@ -84,7 +93,7 @@ PIGMENTS: dict[str, Pigment] = {
     # Gaussians from the ultraviolet make it.
     "phenolics": Pigment(
         ((350, 60, 1.00), (420, 130, 0.25)),
-        "tail of ultraviolet bands near 350 nm; shape after Merzlyak et al. 2005",
+        "tail of a band near 350 nm, as of apple flavonols (Merzlyak et al. 2005); width chosen",
     ),
     # Wood and cork: the same tail much wider.
     "browning": Pigment(((360, 110, 1.00), (500, 180, 0.35)), "shape chosen: monotonic, as of melanoidins"),
@@ -142,7 +151,7 @@ class PigmentTexture(HyperspectralTexture):
         """`count` rows from `first` on: (count, width, bands), float32."""
         amounts, per_unit = self._maps
         inside = kubelka_munk(amounts[first : first + count] @ per_unit)
-        return np.float32(_CUTICLE) + np.float32(1 - _CUTICLE) * inside
+        return np.asarray(_CUTICLE + (1 - _CUTICLE) * inside, dtype=np.float32)
 
 
 def pigment_texture(name: str) -> HyperspectralTexture:

@@ -62,8 +62,14 @@ def spots(height: int, width: int, count: int, radius_deg: float, seed: int, spr
 
     Parameters
     ----------
+    height, width
+        Of the map, in pixels.
+    count
+        Spots on the whole globe.
     radius_deg
         Mean angular radius at half height or so (the Gaussian's standard deviation).
+    seed
+        Of all that is random.
     spread
         Largest relative deviation of radius and strength.
     """
@@ -80,7 +86,9 @@ def spots(height: int, width: int, count: int, radius_deg: float, seed: int, spr
     return result
 
 
-def _add_spot(target: Float32Array, where: Float32Array, polar: float, turn: float, radius: float, strength: float) -> None:
+def _add_spot(
+    target: Float32Array, where: Float32Array, polar: float, turn: float, radius: float, strength: float
+) -> None:
     """Draw one spot into its own small window only, which widens towards the poles and wraps round."""
     height, width = target.shape
     reach = _SPOT_REACH * radius
