@@ -1,8 +1,7 @@
-"""Geometry of the scene's shapes as arrays. Each stands on z = 0, centred on x = y = 0; metres."""
+"""The polygon mesh every shape is, and the helpers that all shapes share."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,11 +33,6 @@ class Mesh:
     smooth: bool = False
 
 
-def build_mesh(shape: str, size: Size) -> Mesh:
-    """The mesh of a shape with bounding box `size` (x, y, z)."""
-    return SHAPES[shape](size)
-
-
 def rotation_matrix(rotation_deg: tuple[float, float, float]) -> Float64Array:
     """(3, 3) of Euler angles in Blender's XYZ order: about x first."""
     x, y, z = np.radians(rotation_deg)
@@ -48,18 +42,8 @@ def rotation_matrix(rotation_deg: tuple[float, float, float]) -> Float64Array:
     return np.asarray(about_z @ about_y @ about_x)
 
 
-def _plane(size: Size) -> Mesh:
-    """A rectangle facing up; its height is not used."""
-    x, y = size[0] / 2, size[1] / 2
-    vertices = np.array([[-x, -y, 0], [x, -y, 0], [x, y, 0], [-x, y, 0]])
-    return Mesh(vertices, ((0, 1, 2, 3),), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
-
-
-def _box(size: Size) -> Mesh:
-    x, y, z = size[0] / 2, size[1] / 2, size[2]
-    vertices = np.array([[i, j, k] for k in (0, z) for j in (-y, y) for i in (-x, x)], dtype=np.float64)
-    faces = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
-    return Mesh(vertices, faces, np.tile([[0.0, 0], [1, 0], [1, 1], [0, 1]], (6, 1)))
-
-
-SHAPES: dict[str, Callable[[Size], Mesh]] = {"plane": _plane, "box": _box}
+def fitted(vertices: Float64Array, size: Size) -> Float64Array:
+    """Vertices (n, 3) stretched into the bounding box `size`, standing on z = 0, centred in x and y."""
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    unit = (vertices - low) / (high - low)
+    return np.asarray((unit - [0.5, 0.5, 0.0]) * np.asarray(size))
