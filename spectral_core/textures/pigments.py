@@ -240,7 +240,7 @@ def _orange(where: Float32Array) -> Maps:
 def _disc(where: Float32Array, pole: int, radius_deg: float) -> Float32Array:
     """1 within a radius of a pole, 0 beyond it, with a soft rim: the scar of the stalk."""
     angle = np.degrees(np.arccos(np.clip(pole * where[..., 2], -1, 1)))
-    return np.clip((radius_deg - angle) / (0.3 * radius_deg) + 0.5, 0, 1)
+    return np.asarray(np.clip((radius_deg - angle) / (0.3 * radius_deg) + 0.5, 0, 1), dtype=np.float32)
 
 
 _FRUIT: dict[str, Callable[[Float32Array], Maps]] = {
