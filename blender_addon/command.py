@@ -1,6 +1,7 @@
 """Commands inside Blender: ``blender -b FILE --command spectral_booth VERB ...``.
 
 With the bpy module instead of an application: ``python -m blender_addon.command VERB ...``.
+The core is imported when a verb runs, because this module is imported when the add-on is registered.
 """
 
 from __future__ import annotations
@@ -11,20 +12,9 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import bpy
-
-from spectral_core.bake import bake
-from spectral_core.display import load_profile
-from spectral_core.errors import BlenderError, SpectralBoothError
-from spectral_core.files import atomic_path
-from spectral_core.imaging import IMAGE_FORMATS
-from spectral_core.lights import Light
-from spectral_core.report.documents import bake_document, verify_document
-from spectral_core.scene import load_scene
-from spectral_core.textures import open_texture
-from spectral_core.verification import worst_stages
 
 NAME = "spectral_booth"
 PROGRESS = "spectral-booth progress"
@@ -34,22 +24,25 @@ Result = dict[str, Any]
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one verb; 0 done, 2 bad input with one line on stderr."""
-    arguments = _parser().parse_args(sys.argv[1:] if argv is None else list(argv))
+    from spectral_core.errors import SpectralBoothError
+
+    try:
+        arguments = _parser().parse_args(sys.argv[1:] if argv is None else list(argv))
+    except SystemExit as stopped:  # argparse's way to end; inside Blender only a return value counts
+        return int(stopped.code or 0)
     try:
         result = arguments.run(arguments)
+        _print(result, arguments.result)
     except SpectralBoothError as error:
         print(f"error: {error}", file=sys.stderr, flush=True)
         return 2
-    text = json.dumps(result, indent=None if arguments.result else 2)
-    if arguments.result:
-        arguments.result.write_text(text, encoding="utf-8")
-    else:
-        print(text, flush=True)
     return 0
 
 
 def build(arguments: argparse.Namespace) -> Result:
     """Build a scene from TOML in an empty file, calibrate its white, save it."""
+    from spectral_core.scene import load_scene
+
     from .bridge import build as building
     from .bridge import lighting
 
@@ -76,6 +69,8 @@ def build(arguments: argparse.Namespace) -> Result:
 
 def render(arguments: argparse.Namespace) -> Result:
     """Render a .blend under a light at a level to PNG."""
+    from spectral_core.errors import BlenderError
+
     from .bridge import lighting
     from .bridge.render import render_png
 
@@ -100,26 +95,20 @@ def verify(arguments: argparse.Namespace) -> Result:
     from .bridge import verify as verifying
 
     scene = _open(arguments.file)
-    description = state.description(scene)
-    lights = arguments.light or list(description.lights)
-    for light in lights:
-        Light.load(light) if not (description.folder / light).is_file() else None
+    lights = arguments.light or list(state.description(scene).lights)
     started = time.perf_counter()
     results = verifying.verify(scene, lights, tuple(arguments.level or (0, 1, 2)), arguments.images, progress)
-    return verify_document(
-        results,
-        worst_stages(results),
-        verifying.left_out(scene),
-        scene=description.name,
-        blender=bpy.app.version_string,
-        shading="forward" if description.render.forward else "deferred",
-        file=str(arguments.file or bpy.data.filepath),
-        seconds=time.perf_counter() - started,
-    )
+    return verifying.document(scene, results, time.perf_counter() - started)
 
 
 def bake_texture(arguments: argparse.Namespace) -> Result:
     """Bake a hyperspectral texture under lights, as `spectral-booth bake` does."""
+    from spectral_core.bake import bake
+    from spectral_core.display import load_profile
+    from spectral_core.lights import Light
+    from spectral_core.report.documents import bake_document
+    from spectral_core.textures import open_texture
+
     texture = open_texture(arguments.file)
     profile = load_profile(arguments.profile)
     result = bake(
@@ -161,8 +150,28 @@ def _blender_command(argv: list[str]) -> int:
     return main(argv)
 
 
+class _Parser(argparse.ArgumentParser):
+    """One line for a wrong argument, as for all bad input."""
+
+    def error(self, message: str) -> NoReturn:
+        print(f"error: {message}; see {self.prog} --help", file=sys.stderr, flush=True)
+        raise SystemExit(2)
+
+
+def _print(result: Result, path: Path | None) -> None:
+    from spectral_core.files import atomic_path
+
+    if path is None:
+        print(json.dumps(result, indent=2), flush=True)
+        return
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(result), encoding="utf-8")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog=NAME, description="Spectral Booth inside Blender")
+    from spectral_core.imaging import IMAGE_FORMATS
+
+    parser = _Parser(prog=NAME, description="Spectral Booth inside Blender")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
 
     def verb(name: str, run: Callable[[argparse.Namespace], Result]) -> argparse.ArgumentParser:
@@ -201,6 +210,8 @@ def _level(arguments: argparse.Namespace, scene: bpy.types.Scene) -> int:
 
 def _open(path: Path | None) -> bpy.types.Scene:
     """The managed scene of a .blend, or of the file that is open."""
+    from spectral_core.errors import BlenderError
+
     from .bridge import state
 
     if path is not None:
@@ -222,18 +233,22 @@ def _open(path: Path | None) -> bpy.types.Scene:
 
 
 def _blend_path(path: Path) -> Path:
+    from spectral_core.errors import BlenderError
+
     if path.suffix != ".blend":
         raise BlenderError("is no name for a Blender file", where=path, remedy="end it with .blend")
     return path.resolve()
 
 
 def _save(path: Path) -> None:
+    from spectral_core.files import atomic_path
+
     with atomic_path(path) as temporary:
         bpy.ops.wm.save_as_mainfile(filepath=str(temporary), check_existing=False, compress=True, copy=True)
 
 
 if __name__ == "__main__":
-    from blender_addon import props
+    from . import props
 
     props.register()
     sys.exit(main())

@@ -11,24 +11,42 @@ LEVEL_ITEMS = (
 )
 
 
+class SpectralBoothLight(bpy.types.PropertyGroup):
+    """One light that a scene offers; its `name` is a built-in name or a file."""
+
+
 class SpectralBoothScene(bpy.types.PropertyGroup):
-    """State of a managed scene; empty in all others."""
+    """State of a managed scene; empty in all others.
+
+    Set light and level through the operators: they change lamps and materials, these record it.
+    """
 
     description: bpy.props.PointerProperty(type=bpy.types.Text, name="Description")  # type: ignore[valid-type]
     folder: bpy.props.StringProperty(name="Folder", subtype="DIR_PATH")  # type: ignore[valid-type]
+    lights: bpy.props.CollectionProperty(type=SpectralBoothLight, name="Lights")  # type: ignore[valid-type]
     light: bpy.props.StringProperty(name="Light", default="D65")  # type: ignore[valid-type]
     level: bpy.props.EnumProperty(name="Level", items=LEVEL_ITEMS, default="2")  # type: ignore[valid-type]
     notes: bpy.props.StringProperty(name="Notes")  # type: ignore[valid-type]
     result: bpy.props.StringProperty(name="Last result")  # type: ignore[valid-type]
 
+    @property
+    def is_managed(self) -> bool:
+        """Whether this add-on built the scene."""
+        return self.description is not None
+
+
+_classes = (SpectralBoothLight, SpectralBoothScene)
+
 
 def register() -> None:
     """Add the scene's properties."""
-    bpy.utils.register_class(SpectralBoothScene)
+    for each in _classes:
+        bpy.utils.register_class(each)
     bpy.types.Scene.spectral_booth = bpy.props.PointerProperty(type=SpectralBoothScene)
 
 
 def unregister() -> None:
     """Remove them again; the data stays in saved files."""
     del bpy.types.Scene.spectral_booth
-    bpy.utils.unregister_class(SpectralBoothScene)
+    for each in reversed(_classes):
+        bpy.utils.unregister_class(each)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib import resources
 from pathlib import Path
 
 from spectral_core.chart import chart_objects, patch_surfaces
@@ -130,6 +131,11 @@ def load_scene(path: str | Path) -> SceneDescription:
     path = Path(path)
     text, reader = read_toml(path)
     return _scene(reader, text, path)
+
+
+def bundled_scene(name: str) -> Path:
+    """A scene description that comes with the project, by its name without ``.toml``."""
+    return Path(str(resources.files("blend_scenes").joinpath(f"{name}.toml")))
 
 
 def parse_scene(text: str, folder: Path, name: str = "scene") -> SceneDescription:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -31,6 +33,19 @@ class Built:
     lights: int
 
 
+def new_scene(description: SceneDescription, calibrate: bool = True) -> bpy.types.Scene:
+    """Build a description as a new scene of the open file, and calibrate its white.
+
+    Whatever goes wrong, the file is then as it was.
+    """
+    with _all_or_nothing():
+        scene = bpy.data.scenes.new(description.name)
+        build_scene(scene, description)
+        if calibrate:
+            lighting.calibrate_white(scene)
+        return scene
+
+
 def build_scene(scene: bpy.types.Scene, description: SceneDescription) -> Built:
     """Fill an empty scene from a description and light it as the description says."""
     surfaces = scene_surfaces(description)
@@ -50,6 +65,30 @@ def build_scene(scene: bpy.types.Scene, description: SceneDescription) -> Built:
     return Built(len(description.objects), len(materials), len(description.lamps))
 
 
+@contextmanager
+def _all_or_nothing() -> Iterator[None]:
+    """Remove what was made in the block if it does not end well."""
+    kinds = (
+        bpy.data.scenes,
+        bpy.data.objects,
+        bpy.data.meshes,
+        bpy.data.lights,
+        bpy.data.cameras,
+        bpy.data.materials,
+        bpy.data.images,
+        bpy.data.worlds,
+        bpy.data.texts,
+    )
+    before = [{each.name for each in kind} for kind in kinds]
+    try:
+        yield
+    except BaseException:
+        bpy.data.batch_remove(
+            [each for kind, names in zip(kinds, before, strict=True) for each in kind if each.name not in names]
+        )
+        raise
+
+
 def eevee_engine(scene: bpy.types.Scene) -> str:
     """Eevee's engine id in this Blender."""
     known = scene.render.bl_rna.properties["engine"].enum_items.keys()
@@ -62,6 +101,7 @@ def _add_object(scene: bpy.types.Scene, item: SceneObject, material: bpy.types.M
     made = bpy.data.objects.new(item.name, data)
     made.location = item.location
     made.rotation_euler = [math.radians(angle) for angle in item.rotation_deg]
+    made[state.OBJECT_KEY] = item.name
     made[state.SURFACE_KEY] = item.surface
     scene.collection.objects.link(made)
 

@@ -65,7 +65,7 @@ def calibrate_white(scene: bpy.types.Scene) -> Calibrated:
         If no light reaches the target, or the camera does not see it.
     """
     description = state.description(scene)
-    white = next((item for item in state.managed_objects(scene) if item.name == description.white.object), None)
+    white = state.described_object(scene, description.white.object)
     if white is None:
         raise BlenderError(f"the white target '{description.white.object}' is gone", remedy="build the scene again")
     mask = measure.identify(scene).masks[white.name]

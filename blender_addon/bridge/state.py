@@ -15,6 +15,7 @@ import bpy
 from spectral_core.errors import SceneError
 from spectral_core.scene import SceneDescription, parse_scene
 
+OBJECT_KEY = "spectral_booth_object"
 SURFACE_KEY = "spectral_booth_surface"
 LAMP_KEY = "spectral_booth_lamp"
 
@@ -26,13 +27,16 @@ def remember(scene: bpy.types.Scene, description: SceneDescription) -> None:
     state = scene.spectral_booth
     state.description = text
     state.folder = str(description.folder)
+    state.lights.clear()
+    for light in description.lights:
+        state.lights.add().name = light
     state.light = description.light
     state.level = str(description.level)
 
 
 def is_managed(scene: bpy.types.Scene) -> bool:
     """Whether this add-on built the scene."""
-    return scene.spectral_booth.description is not None
+    return bool(scene.spectral_booth.is_managed)
 
 
 def description(scene: bpy.types.Scene) -> SceneDescription:
@@ -64,6 +68,13 @@ def managed_lamps(scene: bpy.types.Scene) -> Iterator[bpy.types.Object]:
     return (each for each in scene.objects if each.type == "LIGHT" and LAMP_KEY in each)
 
 
+def described_object(scene: bpy.types.Scene, name: str) -> bpy.types.Object | None:
+    """The object that the description calls `name`: in a file with other scenes, or renamed by the
+    user, it has another name.
+    """
+    return next((each for each in managed_objects(scene) if each.get(OBJECT_KEY) == name), None)
+
+
 def surface_name(item: bpy.types.Object) -> str:
     """The surface that an object shows."""
     return str(item[SURFACE_KEY])
@@ -77,3 +88,11 @@ def managed_materials(scene: bpy.types.Scene) -> dict[str, bpy.types.Material]:
             if slot.material is not None and SURFACE_KEY in slot.material:
                 found[str(slot.material[SURFACE_KEY])] = slot.material
     return found
+
+
+def managed_images(scene: bpy.types.Scene) -> Iterator[bpy.types.Image]:
+    """Images that the scene's spectral materials show."""
+    for material in managed_materials(scene).values():
+        for node in material.node_tree.nodes:
+            if node.type == "TEX_IMAGE" and node.image is not None:
+                yield node.image

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
@@ -12,9 +14,12 @@ import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array
 from spectral_core.bake import file_name
+from spectral_core.errors import BlenderError
+from spectral_core.files import atomic_path
 from spectral_core.imaging import write_png
 from spectral_core.lighting import Lighting
-from spectral_core.scene import LEVELS, SceneDescription
+from spectral_core.report.documents import Document, verify_document
+from spectral_core.scene import LEVELS, SceneDescription, resolve_light
 from spectral_core.surfaces import Surface, scene_surfaces
 from spectral_core.verification import (
     LevelResult,
@@ -24,6 +29,7 @@ from spectral_core.verification import (
     compare,
     conditions,
     pixel_differences,
+    worst_stages,
 )
 
 from . import lighting, materials, measure, state
@@ -39,6 +45,14 @@ _LEAST_IRRADIANCE = 0.2
 Progress = Callable[[float, str], None]
 
 
+@dataclass(frozen=True)
+class Step:
+    """What comes next, and the share that is done, 0..1."""
+
+    fraction: float
+    what: str
+
+
 def verify(
     scene: bpy.types.Scene,
     lights: Sequence[str],
@@ -46,12 +60,31 @@ def verify(
     images: Path | None = None,
     progress: Progress | None = None,
 ) -> list[LightResult]:
-    """Verify a scene under `lights` at `levels`; it is left as it was found.
+    """`verify_steps` in one go."""
+    steps = verify_steps(scene, lights, levels, images)
+    while True:
+        try:
+            step = next(steps)
+        except StopIteration as finished:
+            results: list[LightResult] = finished.value
+            return results
+        if progress:
+            progress(step.fraction, step.what)
 
-    The ColorChecker's patches are what is counted where the scene has one, as published; without
-    one, every uniform surface. With `images`, each render is kept there as PNG.
+
+def verify_steps(
+    scene: bpy.types.Scene, lights: Sequence[str], levels: Sequence[int] = LEVELS, images: Path | None = None
+) -> Generator[Step, None, list[LightResult]]:
+    """Verify a scene under `lights` at `levels`, one render after each step; returns the results.
+
+    The scene is left as it was found, also when the generator is closed before its end. The
+    ColorChecker's patches are what is counted where the scene has one, as published; without one,
+    every uniform surface. With `images`, each render is kept there as PNG.
     """
     description = state.description(scene)
+    for light in lights:
+        resolve_light(light, description.folder)  # refuse a wrong name before the first render
+    yield Step(0.0, "what the camera sees")
     before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
     identity = measure.identify(scene)
     illumination = _illumination(scene, description, identity)
@@ -61,8 +94,7 @@ def verify(
             found: dict[int, LevelResult] = {}
             textures: dict[str, Spread] = {}
             for level in levels:
-                if progress:
-                    progress((index + levels.index(level) / len(levels)) / len(lights), f"{light}, level {level}")
+                yield Step((index + levels.index(level) / len(levels)) / len(lights), f"{light}, level {level}")
                 started = time.perf_counter()
                 applied = lighting.apply(scene, light, level)
                 switched = time.perf_counter() - started
@@ -79,6 +111,48 @@ def verify(
     finally:
         lighting.apply(scene, *before)
     return results
+
+
+def summary(results: Sequence[LightResult]) -> str:
+    """A few lines for the panel: per level, dE00 over all lights."""
+    lights = results[0].name if len(results) == 1 else f"{len(results)} lights"
+    patches = max(level.patches for light in results for level in light.levels.values())
+    lines = [f"{lights}, {patches} colours"]
+    for level in sorted(results[0].levels):
+        dE00 = [light.levels[level].dE00 for light in results]
+        mean, largest = float(np.mean([each.mean for each in dE00])), max(each.max for each in dE00)
+        lines.append(f"Level {level}: dE00 {mean:.2f}, max {largest:.2f}")
+    return "\n".join(lines)
+
+
+def document(scene: bpy.types.Scene, results: Sequence[LightResult], seconds: float) -> Document:
+    """The JSON of `verify`."""
+    description = state.description(scene)
+    return verify_document(
+        results,
+        worst_stages(list(results)),
+        left_out(scene),
+        scene=description.name,
+        blender=bpy.app.version_string,
+        shading="forward" if description.render.forward else "deferred",
+        file=bpy.data.filepath,
+        seconds=seconds,
+    )
+
+
+def json_path() -> Path:
+    """Where `write_json` writes: beside the .blend."""
+    if not bpy.data.filepath:
+        raise BlenderError("the file was never saved, so that JSON has no place beside it", remedy="save it first")
+    return Path(bpy.data.filepath).with_suffix(".verify.json")
+
+
+def write_json(scene: bpy.types.Scene, results: Sequence[LightResult], seconds: float) -> Path:
+    """Write the figures beside the .blend."""
+    path = json_path()
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(document(scene, results, seconds), indent=2), encoding="utf-8")
+    return path
 
 
 def left_out(scene: bpy.types.Scene) -> list[str]:

@@ -1,0 +1,31 @@
+"""Operators ``bpy.ops.spectral_booth.*``: gather inputs, make one call, report what went wrong."""
+
+from __future__ import annotations
+
+import bpy
+
+from .build import BuildScene
+from .light import CalibrateWhite, SetLevel, SetLight
+from .render import RenderScene
+from .verify import VerifyScene
+
+_classes = (
+    BuildScene,
+    SetLight,
+    SetLevel,
+    CalibrateWhite,
+    RenderScene,
+    VerifyScene,
+)
+
+
+def register() -> None:
+    """Add the operators."""
+    for each in _classes:
+        bpy.utils.register_class(each)
+
+
+def unregister() -> None:
+    """Remove them again."""
+    for each in reversed(_classes):
+        bpy.utils.unregister_class(each)
