@@ -134,8 +134,17 @@ def load_scene(path: str | Path) -> SceneDescription:
 
 
 def bundled_scene(name: str) -> Path:
-    """A scene description that comes with the project, by its name without ``.toml``."""
-    return Path(str(resources.files("blend_scenes").joinpath(f"{name}.toml")))
+    """A scene description that comes with the project, by its name without ``.toml``.
+
+    Raises
+    ------
+    SceneError
+        If there is none of that name.
+    """
+    path = Path(str(resources.files("blend_scenes").joinpath(f"{name}.toml")))
+    if not path.is_file():
+        raise SceneError(f"no scene '{name}' comes with this installation", remedy="give the path of a TOML file")
+    return path
 
 
 def parse_scene(text: str, folder: Path, name: str = "scene") -> SceneDescription:
