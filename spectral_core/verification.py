@@ -92,9 +92,10 @@ def compare(
 ) -> LevelResult:
     """Compare readings with theory for one lighting (any level; theory is always the exact colour)."""
     irradiance = np.array([reading.irradiance for reading in readings])[:, None]
-    rendered = np.array([reading.rendered for reading in readings])
-    exact = np.array([reading.exact for reading in readings]) * irradiance
-    stored = np.array([reading.stored for reading in readings]) * irradiance * lighting.lamp_rgb
+    # The shape is said because a view of textures alone has no readings.
+    rendered = np.array([reading.rendered for reading in readings]).reshape(-1, 3)
+    exact = np.array([reading.exact for reading in readings]).reshape(-1, 3) * irradiance
+    stored = np.array([reading.stored for reading in readings]).reshape(-1, 3) * irradiance * lighting.lamp_rgb
     inside = in_gamut(exact)
     difference = np.abs(_codes(rendered) - _codes(exact))
     dE00 = _dE00(rendered, exact, lighting)

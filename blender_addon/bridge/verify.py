@@ -203,12 +203,14 @@ def _read_patches(
 ) -> list[PatchReading]:
     surfaces = scene_surfaces(description)
     shown = state.managed_materials(scene)
-    uniform = [item for item in state.managed_objects(scene) if surfaces[state.surface_name(item)].uniform]
+    uniform = [
+        item
+        for item in state.managed_objects(scene)
+        if surfaces[state.surface_name(item)].uniform and identity.masks[item.name].sum() >= _FEWEST_PIXELS
+    ]
     readings = []
     for item in [each for each in uniform if _is_patch(each)] or uniform:
         mask = identity.masks[item.name]
-        if mask.sum() < _FEWEST_PIXELS:
-            continue
         name = state.surface_name(item)
         readings.append(
             PatchReading(
