@@ -85,7 +85,7 @@ def _white_luminance(
 ) -> float:
     """Mean luminance of the target under neutral lamps of the scene's luminance."""
     reflectance = scene_surfaces(description)[state.surface_name(white)].XYZ(Light.load(description.reference))[1]
-    irradiance = measure.illumination(scene).irradiance
+    irradiance = measure.illumination(scene, within=mask).irradiance
     luminance = float(np.mean(irradiance[mask]) * reflectance * description.white.luminance)
     if not luminance > 0:
         raise BlenderError(f"no light reaches the white target '{white.name}'", remedy="aim a lamp at it")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from spectral_core.arrays import Float32Array, Float64Array
+from spectral_core.arrays import BoolArray, Float32Array, Float64Array
 
 from . import materials, state
 from .render import render_linear
@@ -30,7 +30,7 @@ class Identity:
         (height, width, 2) texture coordinates, v up.
     """
 
-    masks: dict[str, np.ndarray]
+    masks: dict[str, BoolArray]
     uv: Float32Array
 
 
@@ -62,14 +62,15 @@ def identify(scene: bpy.types.Scene) -> Identity:
     return Identity(masks, pixels[..., :2])
 
 
-def illumination(scene: bpy.types.Scene) -> Illumination:
-    """Render the irradiance, and the gloss if the scene has some."""
-    with _neutral(scene, 1.0):
-        white = render_linear(scene).pixels[..., 1]
-    if not any(materials.has_gloss(item) for item in state.managed_materials(scene).values()):
-        return Illumination(white, np.zeros_like(white))
-    with _neutral(scene, 0.0):
-        gloss = render_linear(scene).pixels[..., 1]
+def illumination(scene: bpy.types.Scene, within: BoolArray | None = None) -> Illumination:
+    """Render the irradiance, and the gloss if the scene has some; with `within` only round those pixels."""
+    with _cropped(scene, within):
+        with _neutral(scene, 1.0):
+            white = render_linear(scene).pixels[..., 1]
+        if not any(materials.has_gloss(item) for item in state.managed_materials(scene).values()):
+            return Illumination(white, np.zeros_like(white))
+        with _neutral(scene, 0.0):
+            gloss = render_linear(scene).pixels[..., 1]
     return Illumination(white - gloss, gloss)
 
 
@@ -104,6 +105,27 @@ def _neutral(scene: bpy.types.Scene, value: float) -> Iterator[None]:
             data.color = colour
         for material in managed:
             materials.set_uniform(material, None)
+
+
+@contextmanager
+def _cropped(scene: bpy.types.Scene, within: BoolArray | None) -> Iterator[None]:
+    """Render only the rectangle round `within` (height, width); the rest of the image is black."""
+    if within is None:
+        yield
+        return
+    render = scene.render
+    kept = (render.use_border, render.use_crop_to_border, render.border_min_x, render.border_max_x,
+            render.border_min_y, render.border_max_y)  # fmt: skip
+    height, width = within.shape
+    rows, columns = np.flatnonzero(within.any(axis=1)), np.flatnonzero(within.any(axis=0))
+    render.use_border, render.use_crop_to_border = True, False
+    render.border_min_x, render.border_max_x = columns[0] / width, (columns[-1] + 1) / width
+    render.border_min_y, render.border_max_y = 1 - (rows[-1] + 1) / height, 1 - rows[0] / height
+    try:
+        yield
+    finally:
+        (render.use_border, render.use_crop_to_border, render.border_min_x, render.border_max_x,
+         render.border_min_y, render.border_max_y) = kept  # fmt: skip
 
 
 @contextmanager
@@ -142,7 +164,7 @@ def _identity_material() -> bpy.types.Material:
     return material
 
 
-def _eroded(mask: np.ndarray) -> np.ndarray:
+def _eroded(mask: BoolArray) -> BoolArray:
     """The mask without its border, image edges included."""
     padded = np.pad(mask, _BORDER_PIXELS)
     result = mask.copy()
