@@ -30,7 +30,7 @@ def _world(item: SceneObject) -> Float64Array:
 
 
 def test_has_twelve_leds_the_white_the_chart_fruit_and_solids(booth: SceneDescription) -> None:
-    assert sum(lamp.name.startswith("LED") for lamp in booth.lamps) == 12
+    assert sum(lamp.name.startswith("LED") for lamp in booth.lamps) == len(booth.lamps) == 12
     names = {item.name for item in booth.objects}
     assert {"white", "lemon", "tomato", "apple", "orange"} <= names
     assert {"green cube", "yellow sphere", "red prism", "blue pyramid"} <= names
