@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from spectral_core.arrays import Float64Array
 from spectral_core.display import srgb, srgb_encode
@@ -227,7 +228,7 @@ def _per_patch(
     rendered: Float64Array,
     exact: Float64Array,
     dE00: Float64Array,
-    inside: np.ndarray,
+    inside: npt.NDArray[np.bool_],
 ) -> tuple[PatchDifference, ...]:
     return tuple(
         PatchDifference(

@@ -140,7 +140,7 @@ def _place_labels(figure: Any, axes: Any, dots: list[tuple[str, Float64Array]]) 
     scale = figure.dpi / 72
     frame = axes.get_window_extent(renderer)
     points = axes.transData.transform(np.array([xy for _, xy in dots]))
-    taken = [_box(x, y, 8 * scale, 8 * scale) for x, y in points]
+    taken = [_box(point, 8 * scale, 8 * scale) for point in points]
     for (name, xy), point in zip(dots, points, strict=True):
         text = axes.text(0, 0, name, fontsize=8.5)
         extent = text.get_window_extent(renderer)
@@ -148,7 +148,7 @@ def _place_labels(figure: Any, axes: Any, dots: list[tuple[str, Float64Array]]) 
         width, height = extent.width + 4 * scale, extent.height + 3 * scale
         offset = _free_place(point, width, height, taken, frame, scale)
         centre = point + offset
-        taken.append(_box(*centre, width, height))
+        taken.append(_box(centre, width, height))
         label = axes.annotate(
             name,
             xy,
@@ -179,15 +179,16 @@ def _free_place(
         direction = np.array([np.cos(angle), np.sin(angle)])
         # The edge or corner nearest to the dot lies at the gap, whatever the label's length.
         offset = direction * gap + np.clip(1.6 * direction, -1, 1) * np.array([width, height]) / 2
-        box = _box(*(point + offset), width, height)
+        box = _box(point + offset, width, height)
         inside = frame.x0 < box[0] and box[1] < frame.x1 and frame.y0 < box[2] and box[3] < frame.y1
-        leader = [_box(*(point + share * offset), 1, 1) for share in np.linspace(0.1, 1, 10)]
+        leader = [_box(point + share * offset, 1, 1) for share in np.linspace(0.1, 1, 10)]
         if inside and not any(_overlap(each, other) for each in (box, *leader) for other in others):
             return np.asarray(offset)
     return np.array([0.0, 12.0 * scale])
 
 
-def _box(x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
+def _box(centre: Float64Array, width: float, height: float) -> tuple[float, float, float, float]:
+    x, y = float(centre[0]), float(centre[1])
     return (x - width / 2, x + width / 2, y - height / 2, y + height / 2)
 
 

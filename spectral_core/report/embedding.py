@@ -57,7 +57,7 @@ def data_uri(data: bytes, kind: str) -> str:
 
 def _encoded(image: Any, file_format: str, **options: Any) -> bytes:
     buffer = io.BytesIO()
-    image.save(buffer, file_format, optimize=True, **options)
+    image.save(buffer, file_format, **options)
     return buffer.getvalue()
 
 
@@ -68,9 +68,7 @@ def _narrowed(image: Any, width: int) -> Any:
     image_module = extra("PIL.Image")
     height = max(1, round(image.height * width / image.width))
     linear: Float64Array = srgb_decode(np.asarray(image, dtype=np.float64) / 255)
-    channels = [
-        image_module.fromarray(linear[..., index].astype(np.float32)).resize((width, height), image_module.Resampling.BOX)
-        for index in range(3)
-    ]
+    size, average = (width, height), image_module.Resampling.BOX
+    channels = [image_module.fromarray(linear[..., each].astype(np.float32)).resize(size, average) for each in range(3)]
     codes = srgb_encode(np.stack([np.asarray(each, dtype=np.float64) for each in channels], axis=-1))
     return image_module.fromarray(np.round(255 * np.clip(codes, 0, 1)).astype(np.uint8))

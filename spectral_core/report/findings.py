@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from spectral_core.report.documents import Document
+from spectral_core.report.numerals import count
 from spectral_core.report.tables import CHANNELS
 
 
@@ -65,8 +66,8 @@ KINDS = (
     Kind(
         "extended ends",
         ("repeated beyond",),
-        "Where a reflectance ends before the light does, its last value is repeated; the share of the white's X, Y or Z "
-        "that rests on this bounds the error.",
+        "Where a reflectance ends before the light does, its last value is repeated; the share of the white's X, Y or "
+        "Z that rests on this bounds the error.",
     ),
     Kind(
         "coarse or short table",
@@ -108,9 +109,9 @@ def conditions_met(document: Document) -> list[LightConditions]:
     return found
 
 
-def kinds_met(conditions: list[LightConditions]) -> list[Kind]:
-    """The kinds that occur, in the order of `KINDS`."""
-    names = {name for each in conditions for name, _ in each.met}
+def kinds_met(documents: list[Document]) -> list[Kind]:
+    """The kinds that occur in any of the documents, in the order of `KINDS`."""
+    names = {name for document in documents for each in conditions_met(document) for name, _ in each.met}
     return [kind for kind in KINDS if kind.name in names]
 
 
@@ -125,5 +126,8 @@ def _detail(kind: Kind, text: str) -> str:
     """The sentence without what its kind already says."""
     if kind.name == "negative channels" and ": " in text:
         names = text.split(": ", 1)[1].replace(_CHART_PREFIX, "").split(", ")
-        return f"{len(names)} surface{'' if len(names) == 1 else 's'}: {', '.join(names)}"
+        return f"{count(len(names), 'surface')}: {', '.join(names)}"
+    if kind.name == "extended ends" and ": " in text:
+        share = text.split(": ", 1)[1].replace("0.000%", "less than 0.001%")
+        return share.replace("%", " %")
     return text

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
@@ -13,13 +13,14 @@ import numpy as np
 from spectral_core.bake import file_name
 from spectral_core.errors import OutputError
 from spectral_core.files import atomic_path
-from spectral_core.lights import Light
+from spectral_core.lights import Light, LightQuality
 from spectral_core.report import findings, numerals, tables
 from spectral_core.report.chromaticity import chromaticity_plot
 from spectral_core.report.documents import Document
 from spectral_core.report.embedding import image_uri
 from spectral_core.report.extras import extra
 from spectral_core.report.plots import ErrorPoint, PatchError, level_plot, patch_map, spd_plot, time_plot
+from spectral_core.report.published import published_lights
 from spectral_core.scene import resolve_light
 
 # Renders may take this much of the page, base64 included, so that it can be mailed.
@@ -132,54 +133,52 @@ def write_report(path: Path, report: ReportInput) -> None:
 
 def _context(report: ReportInput) -> dict[str, Any]:
     lights = _lights(report)
-    strips = _strips(report, lights)
+    qualities = {name: light.quality() for name, light in lights.items()}
+    strips = _strips(report, qualities)
     return {
         "title": report.title,
         "css": resources.files("spectral_core.report").joinpath("report.css").read_text(encoding="utf-8"),
-        "runs": [_run(run) for run in report.runs],
+        "runs": [_run(run, run is report.chart) for run in report.runs],
         "light_names": list(lights),
         "booth_strips": strips.get("booth", []),
         "chart_strips": strips.get("chart", []),
-        "lights_table": tables.lights_table(lights),
-        "published": bool(tables.published_lights().keys() & lights.keys()),
+        "lights_table": tables.lights_table(lights, qualities),
+        "published": bool(published_lights().keys() & lights.keys()),
         "spds": [(name, spd_plot(light)) for name, light in lights.items()],
         "chromaticity": chromaticity_plot({name: light.xy() for name, light in lights.items()}),
         "colorchecker": tables.colorchecker_table() if report.chart else None,
+        "kinds": findings.kinds_met([run.document for run in report.runs]),
         "count": numerals.count,
-        "listed": numerals.listed,
     }
 
 
 def _lights(report: ReportInput) -> dict[str, Light]:
     """All lights of the documents by the names they have there, each once."""
-    return {
-        light["name"]: resolve_light(light["name"], run.folder) for run in report.runs for light in run.document["lights"]
-    }
+    names = ((light["name"], run.folder) for run in report.runs for light in run.document["lights"])
+    return {name: resolve_light(name, folder) for name, folder in names}
 
 
-def _run(run: SceneRun) -> dict[str, Any]:
+def _run(run: SceneRun, chart: bool) -> dict[str, Any]:
     """What the template shows of one scene."""
     document = run.document
     points = error_points(document)
-    conditions = findings.conditions_met(document)
     return {
         "scene": document["scene"],
         "blender": document.get("blender"),
         "shading": document.get("shading"),
         "lights": [light["name"] for light in document["lights"]],
         "worst": {level: findings.worst(document, level) for level in tables.LEVELS},
-        "switch_ms": _mean_switch_ms(document),
+        "switch_ms": {level: _mean_switch_ms(document, level) for level in tables.LEVELS},
         "channels": tables.channels_table(document),
         "differences": tables.difference_table(document),
-        "published": tables.published_table(document),
+        "published": tables.published_table(document) if chart else None,
         "textures": tables.textures_table(document),
         "stages": tables.stages_table(document),
         "times": tables.time_table(document),
         "level_plot": level_plot(points),
         "time_plot": time_plot(points),
         "patch_maps": [(name, patch_map(each)) for name, each in patch_errors(document).items()],
-        "conditions": conditions,
-        "kinds": findings.kinds_met(conditions),
+        "conditions": findings.conditions_met(document),
         "left_out": document.get("left_out", []),
     }
 
@@ -216,44 +215,56 @@ def patch_errors(document: Document) -> dict[str, list[PatchError]]:
         }
         if readings:
             found[light["name"]] = [
-                PatchError(
-                    exact=tuple(each[0]["exact_rgb_8bit"]),
-                    rendered={level: tuple(one["rendered_rgb_8bit"]) for level, one in zip(readings, each, strict=True)},
-                    dE00={level: one["dE00"] for level, one in zip(readings, each, strict=True)},
-                    in_gamut=each[0]["in_gamut"],
-                )
-                for each in zip(*readings.values(), strict=True)
+                _patch_error(dict(zip(readings, each, strict=True))) for each in zip(*readings.values(), strict=True)
             ]
     return found
 
 
-def _mean_switch_ms(document: Document) -> float:
-    seconds = [light["level2"]["switch_seconds"] for light in document["lights"] if "level2" in light]
+def _patch_error(readings: Mapping[int, Any]) -> PatchError:
+    """One patch from its readings by level; the exact colour is the same at all of them."""
+    one = next(iter(readings.values()))
+    return PatchError(
+        exact=tuple(one["exact_rgb_8bit"]),
+        rendered={level: tuple(each["rendered_rgb_8bit"]) for level, each in readings.items()},
+        dE00={level: each["dE00"] for level, each in readings.items()},
+        in_gamut=one["in_gamut"],
+    )
+
+
+def _mean_switch_ms(document: Document, level: int) -> float:
+    key = f"level{level}"
+    seconds = [light[key]["switch_seconds"] for light in document["lights"] if key in light]
     return 1000 * sum(seconds) / len(seconds) if seconds else float("nan")
 
 
-def _strips(report: ReportInput, lights: Mapping[str, Light]) -> dict[str, list[_Strip]]:
+def _strips(report: ReportInput, qualities: Mapping[str, LightQuality]) -> dict[str, list[_Strip]]:
     """Renders side by side: all levels of the chart; the booth plain and managed."""
-    plans = {"chart": (report.chart, tables.LEVELS), "booth": (report.booth, (0, 2))}
-    wanted = {
-        scene: [key for light in run.document["lights"] for level in levels if (key := (light["name"], level)) in run.renders]
-        for scene, (run, levels) in plans.items()
-        if run is not None
+    plans = [("chart", report.chart, tables.LEVELS), ("booth", report.booth, (0, 2))]
+    shown = {
+        scene: _shown(run, levels) for scene, run, levels in plans if run is not None and run.document.get("lights")
     }
-    total = max(1, sum(map(len, wanted.values())))
-    allowance = int(IMAGE_BUDGET_BYTES / _BASE64_GROWTH / total)
-    found: dict[str, list[_Strip]] = {}
-    for scene, keys in wanted.items():
-        run = plans[scene][0]
-        assert run is not None
-        for light in dict.fromkeys(name for name, _ in keys):
-            pictures = tuple(
-                _picture(scene, light, level, run.renders[name, level], allowance)
-                for name, level in keys
-                if name == light
+    pictures = sum(len(levels) for lights in shown.values() for levels in lights.values())
+    allowance = int(IMAGE_BUDGET_BYTES / _BASE64_GROWTH / max(1, pictures))
+    return {
+        scene: [
+            _Strip(
+                light,
+                _facts(qualities[light]),
+                tuple(_picture(scene, light, level, path, allowance) for level, path in levels.items()),
             )
-            found.setdefault(scene, []).append(_Strip(light, _facts(lights[light]), pictures))
-    return found
+            for light, levels in lights.items()
+        ]
+        for scene, lights in shown.items()
+    }
+
+
+def _shown(run: SceneRun, levels: Sequence[int]) -> dict[str, dict[int, Path]]:
+    """The renders there are, by light and level, in the order of the document."""
+    names = [light["name"] for light in run.document["lights"]]
+    found = {
+        name: {level: run.renders[name, level] for level in levels if (name, level) in run.renders} for name in names
+    }
+    return {name: renders for name, renders in found.items() if renders}
 
 
 def _picture(scene: str, light: str, level: int, path: Path, allowance_bytes: int) -> _Picture:
@@ -262,7 +273,6 @@ def _picture(scene: str, light: str, level: int, path: Path, allowance_bytes: in
     return _Picture(label, image_uri(path, allowance_bytes), f"{scene} under {light}, {label}")
 
 
-def _facts(light: Light) -> str:
-    quality = light.quality()
+def _facts(quality: LightQuality) -> str:
     cct = f"{quality.cct_K:.0f} K" if quality.cct_K is not None else "no CCT"
     return cct if quality.rf is None else f"{cct}, Rf {quality.rf:.1f}"

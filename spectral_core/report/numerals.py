@@ -35,8 +35,3 @@ def small(value: float, digits: int = 2) -> str:
 def count(number: int, noun: str) -> str:
     """``1 light``, ``2 lights``."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
-
-
-def listed(words: list[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}" if words else ""

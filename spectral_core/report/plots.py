@@ -134,7 +134,7 @@ def level_plot(points: Sequence[ErrorPoint]) -> str:
 
 def time_plot(points: Sequence[ErrorPoint]) -> str:
     """Mean dE00 in gamut against seconds to switch and render, one mark per light and level."""
-    figure = new_figure(6.4, 3.6)
+    figure = new_figure(5.6, 4.0)
     with style():
         axes = figure.subplots()
         for level in sorted({point.level for point in points}):
@@ -190,9 +190,14 @@ def _draw_patch(axes: Any, column: int, row: int, patch: PatchError) -> None:
             _square(axes, column + x, row + 0.2, 0.3, 0.34, patch.rendered[level])
     bright = float(np.dot(np.clip(patch.exact, 0, 255), (0.3, 0.6, 0.1))) > 120
     ink = "#000000" if bright else "#ffffff"
-    numbers = "   ".join(f"{patch.dE00[level]:.1f}" for level in (1, 2) if level in patch.dE00)
+    numbers = "   ".join(_short(patch.dE00[level]) for level in (1, 2) if level in patch.dE00)
     mark = "" if patch.in_gamut else " *"
     axes.text(column + 0.5, row + 0.76, numbers + mark, color=ink, ha="center", va="center", fontsize=8)
+
+
+def _short(dE00: float) -> str:
+    """Two digits, so that two numbers and a mark fit into a patch."""
+    return f"{dE00:.1f}" if dE00 < 9.95 else f"{dE00:.0f}"
 
 
 def _square(axes: Any, x: float, y: float, width: float, height: float, rgb_8bit: Sequence[float]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from spectral_core import standards
 from spectral_core.arrays import Float64Array
 from spectral_core.display import srgb, srgb_encode
-from spectral_core.lights import Light
+from spectral_core.lights import Light, LightQuality
 from spectral_core.report.documents import Document
 from spectral_core.report.numerals import NONE, fixed, small, spread
 from spectral_core.report.published import published_differences, published_hyperspectral_srgb, published_lights
@@ -21,6 +21,8 @@ LEVELS = (0, 1, 2)
 # Luminance of the perfect diffuser of the published table of lights, relative to a D65 white.
 TABLE_LUMINANCE = 0.85
 CHANNELS = "RGB"
+# The one stage that is the same at every level.
+_ROUNDING = "8-bit rounding"
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,6 @@ class Table:
     rows: tuple[Row, ...]
     groups: tuple[tuple[str, int], ...] = ()
     text_columns: int = 1
-    classes: str = ""
     foot: tuple[Row, ...] = field(default=())
 
 
@@ -61,12 +62,12 @@ def rgb_at(light: Light, luminance: float = TABLE_LUMINANCE) -> Float64Array:
     return np.asarray(255 * srgb_encode(srgb().to_linear(light.XYZ() * luminance)))
 
 
-def lights_table(lights: Mapping[str, Light]) -> Table:
+def lights_table(lights: Mapping[str, Light], qualities: Mapping[str, LightQuality]) -> Table:
     """Colour and quality of each light, with the published row beneath where there is one."""
     published = published_lights()
     rows = []
     for name, light in lights.items():
-        quality, rgb = light.quality(), rgb_at(light)
+        quality, rgb = qualities[name], rgb_at(light)
         colour = (*(fixed(each, 4) for each in light.xy()), fixed(quality.cct_K, 0), fixed(quality.duv, 4))
         indices = (fixed(quality.rf, 1), fixed(quality.ra, 1))
         codes = tuple(fixed(each, 1) for each in rgb)
@@ -141,7 +142,7 @@ def published_table(document: Document) -> Table | None:
             rgb8 = light[f"level{level}"]["rgb8"]
             cells = [light["name"] if level == 1 else "", str(level)]
             for index, channel in enumerate(CHANNELS):
-                cells.append(f"{theirs.mean[index]:g} ± {theirs.sd[index]:g}")
+                cells.append(_as_printed(theirs.mean[index], theirs.sd[index]))
                 cells.append(spread(rgb8[channel]["mean"], rgb8[channel]["sd"]))
             rows.append(Row(tuple(cells), group=level == 1))
     if not rows:
@@ -157,22 +158,29 @@ def published_table(document: Document) -> Table | None:
     )
 
 
+def _as_printed(mean: float, sd: float) -> str:
+    """Published differences with the digits they were printed with."""
+    return f"{fixed(mean, 1 if mean < 10 else 0)} ± {sd:g}"
+
+
 def textures_table(document: Document) -> Table | None:
-    """Per light and textured object the 8-bit differences over single pixels at level 2."""
-    rows = [
-        Row((light["name"] if index == 0 else "", name, spread(each["mean"], each["sd"]), fixed(each["max"], 2)), index == 0)
-        for light in document["lights"]
-        for index, (name, each) in enumerate(light.get("textures", {}).items())
-    ]
-    if not rows:
+    """Per textured object and light the 8-bit differences over single pixels at level 2."""
+    lights = document["lights"]
+    objects = list(dict.fromkeys(name for light in lights for name in light.get("textures", {})))
+    if not objects:
         return None
+    rows = [Row((name, *(_mean_and_max(light.get("textures", {}).get(name)) for light in lights))) for name in objects]
     return Table(
         f"{document['scene']}: hyperspectral textures at level 2, single pixels against the texture's exact colour at "
-        "the same point, 8-bit sRGB levels over all channels.",
-        ("light", "object", "mean ± sd", "max"),
+        "the same point, both clipped to 0…255: mean / maximum over pixels and channels, 8-bit sRGB levels before "
+        "rounding.",
+        ("object", *(light["name"] for light in lights)),
         tuple(rows),
-        text_columns=2,
     )
+
+
+def _mean_and_max(spread_of: Mapping[str, float] | None) -> str:
+    return NONE if spread_of is None else f"{fixed(spread_of['mean'], 2)} / {fixed(spread_of['max'], 2)}"
 
 
 def stages_table(document: Document) -> Table | None:
@@ -190,13 +198,14 @@ def stages_table(document: Document) -> Table | None:
     if not rows:
         return None
     total = ["all lights", "", "", *(each for name in names for each in _mean_max(document["stages"][name]))]
+    groups = [(name if name == _ROUNDING else f"level 2: {name}", 2) for name in names]
     return Table(
         f"{document['scene']}: what each stage costs, 8-bit sRGB levels, mean and maximum over patches and channels. "
         "8-bit rounding: an exact colour shown in 8 bits (not part of the other figures). Material: exact colour "
         "against lamp times material as stored in float32. Eevee: stored against rendered.",
         ("light", *(("mean", "max") * (1 + len(names)))),
         tuple(rows),
-        groups=(("", 1), ("level 1: material", 2), *((f"level 2: {name}", 2) for name in names)),
+        groups=(("", 1), ("level 1: material", 2), *groups),
         foot=(Row(tuple(total)),),
     )
 
@@ -245,13 +254,15 @@ def colorchecker_table() -> Table:
     shown = np.clip(ours, 0, 255)
     rows = []
     for index, name in enumerate(names):
-        codes = [fixed(each, 0) for each in (*maker[index], *published[index])] + [fixed(each, 1) for each in ours[index]]
+        codes = [fixed(each, 0) for each in (*maker[index], *published[index])]
+        codes += [fixed(each, 1) for each in ours[index]]
         swatches = tuple(css_colour(each[index]) for each in (maker, published, ours))
         rows.append(Row((f"{index + 1}", name, *codes), swatches=swatches))
     theirs, mine = np.abs(published - maker).mean(axis=0), np.abs(shown - maker).mean(axis=0)
     apart = np.abs(shown - published).mean(axis=0)
+    from_maker = [fixed(each, 2) for each in (*theirs, *mine)]
     foot = (
-        Row(("", "mean difference from the maker's", "", "", "", *(fixed(e, 2) for e in theirs), *(fixed(e, 2) for e in mine))),
+        Row(("", "mean difference from the maker's", "", "", "", *from_maker)),
         Row(("", "mean difference, ours from published", *[""] * 6, *(fixed(each, 2) for each in apart))),
     )
     return Table(
