@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from typing import Any
 
 import numpy as np
@@ -133,6 +133,7 @@ def write_report(path: Path, report: ReportInput) -> None:
 
 def _context(report: ReportInput) -> dict[str, Any]:
     lights = _lights(report)
+    report = replace(report, chart=_with_short_names(report.chart), booth=_with_short_names(report.booth))
     qualities = {name: light.quality() for name, light in lights.items()}
     strips = _strips(report, qualities)
     return {
@@ -153,9 +154,22 @@ def _context(report: ReportInput) -> dict[str, Any]:
 
 
 def _lights(report: ReportInput) -> dict[str, Light]:
-    """All lights of the documents by the names they have there, each once."""
+    """All lights of the documents by the names the page gives them, each once."""
     names = ((light["name"], run.folder) for run in report.runs for light in run.document["lights"])
-    return {name: resolve_light(name, folder) for name, folder in names}
+    return {_short_name(name): resolve_light(name, folder) for name, folder in names}
+
+
+def _short_name(name: str) -> str:
+    """A light from a file goes by the file's name: folders say nothing to a reader, or too much."""
+    return PureWindowsPath(name).name
+
+
+def _with_short_names(run: SceneRun | None) -> SceneRun | None:
+    if run is None:
+        return None
+    lights = [{**light, "name": _short_name(light["name"])} for light in run.document.get("lights", [])]
+    renders = {(_short_name(light), level): path for (light, level), path in run.renders.items()}
+    return replace(run, document={**run.document, "lights": lights}, renders=renders)
 
 
 def _run(run: SceneRun, chart: bool) -> dict[str, Any]:

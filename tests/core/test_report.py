@@ -173,7 +173,7 @@ def test_headline_names_the_worst_light(page: Path):
     assert worst.levels == pytest.approx(0.2457)
     assert worst.levels_light == "two-peaks-d65"
     assert (worst.dE00_light, worst.dE00) == ("D65", pytest.approx(0.0274))
-    assert "0.25 of an 8-bit sRGB level (two-peaks-d65)" in " ".join(read(page).text.split())
+    assert "0.25 of an 8-bit sRGB level before rounding (two-peaks-d65)" in " ".join(read(page).text.split())
 
 
 @needs_extra
@@ -221,6 +221,21 @@ def test_missing_packages_are_named_with_the_remedy(tmp_path: Path, monkeypatch:
     monkeypatch.setattr(importlib, "import_module", refuse)
     with pytest.raises(MissingExtraError, match=r"pip install 'spectral-booth\[report\]'"):
         write_report(tmp_path / "report.html", ReportInput(SceneRun(document())))
+
+
+@needs_extra
+def test_a_light_from_a_file_is_shown_by_the_name_of_its_file(tmp_path: Path):
+    lamp = tmp_path / "my lamp.csv"
+    lamp.write_text("nm,power\n" + "\n".join(f"{nm},1" for nm in range(380, 785, 5)), encoding="utf-8")
+    picture = tmp_path / "picture.png"
+    write_png(picture, np.full((2, 2, 3), 0.5, dtype=np.float32))
+    short = document()
+    short["lights"] = [{**short["lights"][0], "name": str(lamp)}]
+    write_report(tmp_path / "report.html", ReportInput(SceneRun(short, {(str(lamp), 2): picture})))
+    reader = read(tmp_path / "report.html")
+    assert "my lamp.csv" in reader.cells
+    assert str(tmp_path) not in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "No renders were kept." not in reader.text
 
 
 def test_published_tables_have_our_names():
