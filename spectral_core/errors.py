@@ -46,3 +46,7 @@ class OutputError(SpectralBoothError):
 
 class BlenderError(SpectralBoothError):
     """Blender is missing, or did not do what was asked."""
+
+
+class MissingExtraError(SpectralBoothError):
+    """An optional package that a task needs is not installed."""

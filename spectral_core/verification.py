@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from spectral_core.arrays import Float64Array
 from spectral_core.display import srgb, srgb_encode
@@ -59,6 +60,30 @@ class PatchReading:
 
 
 @dataclass(frozen=True)
+class PatchDifference:
+    """One surface at one level against theory.
+
+    Attributes
+    ----------
+    name, surface
+        The object and its surface.
+    rendered_rgb_8bit, exact_rgb_8bit
+        (3,) 255 times the encoded sRGB value, neither rounded nor clipped.
+    dE00
+        CIEDE2000 between the two, not clipped, relative to the white under the light.
+    in_gamut
+        Whether the exact colour needs no clipping.
+    """
+
+    name: str
+    surface: str
+    rendered_rgb_8bit: tuple[float, ...]
+    exact_rgb_8bit: tuple[float, ...]
+    dE00: float
+    in_gamut: bool
+
+
+@dataclass(frozen=True)
 class LevelResult:
     """One light at one level against theory.
 
@@ -74,6 +99,10 @@ class LevelResult:
         The same over the patches in gamut.
     stages
         8-bit levels (mean and max over patches and channels) lost by each stage.
+    patches, in_gamut
+        How many were read, and how many of them need no clipping.
+    readings
+        Patch by patch, in the order of the scene.
     """
 
     rgb8: dict[str, Spread]
@@ -85,6 +114,7 @@ class LevelResult:
     in_gamut: int
     switch_seconds: float
     render_seconds: float
+    readings: tuple[PatchDifference, ...] = ()
 
 
 def compare(
@@ -113,6 +143,7 @@ def compare(
         in_gamut=int(inside.sum()),
         switch_seconds=switch_seconds,
         render_seconds=render_seconds,
+        readings=_per_patch(readings, rendered, exact, dE00, inside),
     )
 
 
@@ -191,6 +222,26 @@ def _dE00(rendered: Float64Array, exact: Float64Array, lighting: Lighting) -> Fl
     white = lighting.light.XYZ() * lighting.luminance
     matrix = np.linalg.inv(srgb().to_linear(np.eye(3)).T)
     return delta_E_2000(XYZ_to_Lab(rendered @ matrix.T, white), XYZ_to_Lab(exact @ matrix.T, white))
+
+
+def _per_patch(
+    readings: list[PatchReading],
+    rendered: Float64Array,
+    exact: Float64Array,
+    dE00: Float64Array,
+    inside: npt.NDArray[np.bool_],
+) -> tuple[PatchDifference, ...]:
+    return tuple(
+        PatchDifference(
+            reading.name,
+            reading.surface,
+            tuple((255 * srgb_encode(rendered[index])).tolist()),
+            tuple((255 * srgb_encode(exact[index])).tolist()),
+            float(dE00[index]),
+            bool(inside[index]),
+        )
+        for index, reading in enumerate(readings)
+    )
 
 
 def _per_channel(difference: Float64Array) -> dict[str, Spread]:
