@@ -90,7 +90,8 @@ def missing_ends(reference: Reference) -> list[dict[str, object]]:
 
 def lamp_interpolation(reference: Reference) -> list[dict[str, object]]:
     """How far the colours move if the lamp's table is interpolated to 1 nm (cubic spline) first,
-    against the sum at its own samples, and the xy shift of the white."""
+    against the sum at its own samples, and the xy shift of the white.
+    """
     rows = []
     grid = np.arange(380.0, 781.0)
     for name in (*SMOOTH, *SPIKY):
@@ -129,18 +130,24 @@ def main() -> None:
     _print(
         "dE00 over 24 spectra by sampling step: cubic mean, max | linear mean, max",
         shown,
-        lambda row: f"{row['light']:<28} {row['step_nm']:>3} nm   {row['cubic']['mean']:.5f} {row['cubic']['max']:.5f}"
-        f" | {row['linear']['mean']:.5f} {row['linear']['max']:.5f}",
+        lambda row: (
+            f"{row['light']:<28} {row['step_nm']:>3} nm   {row['cubic']['mean']:.5f} {row['cubic']['max']:.5f}"
+            f" | {row['linear']['mean']:.5f} {row['linear']['max']:.5f}"
+        ),
     )
     _print(
         "two-peak metamers of D65 at 4 nm, max dE00: cubic | linear",
         result["two_peaks"],
-        lambda row: f"{row['peaks_nm'][0]:.0f} + {row['peaks_nm'][1]:.2f} nm   {row['cubic']:.5f} | {row['linear']:.5f}",
+        lambda row: (
+            f"{row['peaks_nm'][0]:.0f} + {row['peaks_nm'][1]:.2f} nm   {row['cubic']:.5f} | {row['linear']:.5f}"
+        ),
     )
     _print(
         "missing ends at 4 nm: share of the white that is extended, max dE00",
         result["missing_ends"],
-        lambda row: f"{row['light']:<6} {row['bands_nm'][0]}-{row['bands_nm'][1]} nm   {row['extended']:.3%}   {row['max']:.4f}",
+        lambda row: (
+            f"{row['light']:<6} {row['bands_nm'][0]}-{row['bands_nm'][1]} nm   {row['extended']:.3%}   {row['max']:.4f}"
+        ),
     )
     _print(
         "lamp's table interpolated to 1 nm instead of summed at its samples: max dE00, xy shift",

@@ -11,6 +11,7 @@ from spectral_core.blender_process import run_verb
 from spectral_core.console import Document, emit, facts, progress_bar, table
 from spectral_core.demo import run_demo
 from spectral_core.options import as_json
+from spectral_core.report.html import ReportInput, SceneRun, find_renders, write_report
 from spectral_core.scene import load_scene
 
 _PATH = click.Path(path_type=Path)
@@ -76,6 +77,9 @@ def verify(
         document = run_verb(arguments, progress)
     failed = [each["name"] for each in document["lights"] if _largest(each) > limit]
     document = {**document, "limit": limit, "failed": failed}
+    if report:
+        run = SceneRun(document, find_renders(images, document) if images else {}, file.parent)
+        write_report(report, ReportInput(chart=run))
     emit(document, json, lambda console: console.print(table(_COLUMNS, verify_rows(document), document["scene"])))
     return 1 if failed else 0
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import tempfile
 import time
 from collections.abc import Iterator
@@ -66,7 +65,7 @@ def _output(scene: bpy.types.Scene, path: Path, file_format: str, depth: str) ->
 
 
 def _read(path: Path) -> Float32Array:
-    if not path.exists() or not os.path.getsize(path):
+    if not path.exists() or not path.stat().st_size:
         raise BlenderError(
             "Blender wrote no image", remedy="is there room in the temporary folder, and a graphics driver?"
         )

@@ -59,7 +59,7 @@ class ReportInput:
     chart
         A scene with single patches, the ColorChecker: its three levels are set side by side.
     booth
-        A scene to look at: plain (level 0) is set beside managed (level 2).
+        A scene to look at: plain (level 1) is set beside managed (level 2).
     title
         The heading.
     """
@@ -253,7 +253,7 @@ def _mean_switch_ms(document: Document, level: int) -> float:
 
 def _strips(report: ReportInput, qualities: Mapping[str, LightQuality]) -> dict[str, list[_Strip]]:
     """Renders side by side: all levels of the chart; the booth plain and managed."""
-    plans = [("chart", report.chart, tables.LEVELS), ("booth", report.booth, (0, 2))]
+    plans = [("chart", report.chart, tables.LEVELS), ("booth", report.booth, (1, 2))]
     shown = {
         scene: _shown(run, levels) for scene, run, levels in plans if run is not None and run.document.get("lights")
     }
@@ -283,7 +283,7 @@ def _shown(run: SceneRun, levels: Sequence[int]) -> dict[str, dict[int, Path]]:
 
 def _picture(scene: str, light: str, level: int, path: Path, allowance_bytes: int) -> _Picture:
     chart = {0: "level 0: white lamps", 1: "level 1: lamps of the light's RGB", 2: "level 2: spectral"}
-    label = chart[level] if scene == "chart" else {0: "plain", 1: "level 1", 2: "managed"}[level]
+    label = chart[level] if scene == "chart" else {1: "plain: RGB lamps, RGB materials", 2: "managed: spectral"}[level]
     return _Picture(label, image_uri(path, allowance_bytes), f"{scene} under {light}, {label}")
 
 

@@ -94,7 +94,7 @@ class NpzTexture(HyperspectralTexture):
         try:
             if self._stream is None or first < self._next_row:
                 self.close()
-                archive = zipfile.ZipFile(self._path)  # noqa: SIM115 (kept open from tile to tile)
+                archive = zipfile.ZipFile(self._path)
                 self._stream = archive.open(f"{self._member}.npy")
                 _header(self._stream, self._path)
                 self._next_row = 0
