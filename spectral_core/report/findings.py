@@ -22,6 +22,16 @@ class Worst:
 
 
 @dataclass(frozen=True)
+class WorstTexture:
+    """8-bit levels over single pixels of textures: mean over objects and lights, largest and where."""
+
+    mean: float
+    max: float
+    object: str
+    light: str
+
+
+@dataclass(frozen=True)
 class Kind:
     """A kind of numerical condition: its name, what marks its sentence, and what is done about it."""
 
@@ -98,6 +108,19 @@ def worst(document: Document, level: int) -> Worst | None:
         dE00_light,
         sum(each["mean"] for each in inside.values()) / len(inside) if inside else 0.0,
     )
+
+
+def worst_texture(document: Document) -> WorstTexture | None:
+    """The headline figures of the textures at level 2; None if the scene has none."""
+    found = [
+        (each["max"], each["mean"], name, light["name"])
+        for light in document["lights"]
+        for name, each in light.get("textures", {}).items()
+    ]
+    if not found:
+        return None
+    largest = max(found)
+    return WorstTexture(sum(mean for _, mean, *_ in found) / len(found), largest[0], largest[2], largest[3])
 
 
 def conditions_met(document: Document) -> list[LightConditions]:

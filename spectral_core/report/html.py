@@ -182,6 +182,7 @@ def _run(run: SceneRun, chart: bool) -> dict[str, Any]:
         "shading": document.get("shading"),
         "lights": [light["name"] for light in document["lights"]],
         "worst": {level: findings.worst(document, level) for level in tables.LEVELS},
+        "worst_texture": findings.worst_texture(document),
         "switch_ms": {level: _mean_switch_ms(document, level) for level in tables.LEVELS},
         "channels": tables.channels_table(document),
         "differences": tables.difference_table(document),

@@ -176,6 +176,11 @@ def test_headline_names_the_worst_light(page: Path):
     assert "0.25 of an 8-bit sRGB level before rounding (two-peaks-d65)" in " ".join(read(page).text.split())
 
 
+def test_headline_owns_up_to_textures(page: Path):
+    text = " ".join(read(page).text.split())
+    assert "off by 0.31 levels on average and 2.72 at most (lemon, two-peaks-d65)" in text
+
+
 @needs_extra
 @pytest.mark.parametrize("scene", ["chart", "booth"])
 def test_one_scene_is_enough_and_pages_are_reproducible(tmp_path: Path, scene: str):
