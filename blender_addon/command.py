@@ -103,7 +103,7 @@ def verify(arguments: argparse.Namespace) -> Result:
 
 def bake_texture(arguments: argparse.Namespace) -> Result:
     """Bake a hyperspectral texture under lights, as `spectral-booth bake` does."""
-    from spectral_core.bake import bake
+    from spectral_core.baking import bake
     from spectral_core.display import load_profile
     from spectral_core.lights import Light
     from spectral_core.report.documents import bake_document

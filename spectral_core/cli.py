@@ -10,7 +10,7 @@ from typing import Any
 import click
 
 from spectral_core import documents
-from spectral_core.bake import bake
+from spectral_core.baking import bake
 from spectral_core.cli_blender import add_blender_commands
 from spectral_core.console import cell, emit, facts, progress_bar, rounded, table
 from spectral_core.display import load_profile

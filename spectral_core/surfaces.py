@@ -12,7 +12,7 @@ import numpy as np
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array, frozen
-from spectral_core.bake import level2_weights, project
+from spectral_core.baking import level2_weights, project
 from spectral_core.display import srgb, srgb_decode, srgb_encode
 from spectral_core.errors import SceneError
 from spectral_core.lights import Light

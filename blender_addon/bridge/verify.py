@@ -13,7 +13,7 @@ import bpy
 import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array
-from spectral_core.bake import file_name
+from spectral_core.baking import file_name
 from spectral_core.errors import BlenderError
 from spectral_core.files import atomic_path
 from spectral_core.imaging import write_png

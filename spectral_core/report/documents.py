@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from spectral_core.bake import BakeResult
+from spectral_core.baking import BakeResult
 from spectral_core.verification import LightResult
 
 Document = dict[str, Any]

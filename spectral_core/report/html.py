@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from spectral_core.bake import file_name
+from spectral_core.baking import file_name
 from spectral_core.errors import OutputError
 from spectral_core.files import atomic_path
 from spectral_core.lights import Light, LightQuality

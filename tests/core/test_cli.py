@@ -105,3 +105,12 @@ def test_help_and_version(run: Run) -> None:
     assert "Usage" in run("--help")[1]
     for command in ("light", "bake", "verify", "demo"):
         assert "--json" in run(command, "--help")[1]
+
+
+def test_the_public_names_are_there_whatever_was_imported_before() -> None:
+    import spectral_core as sb
+
+    for name in sb.__all__:
+        assert callable(getattr(sb, name))
+    with pytest.raises(AttributeError, match="no attribute 'colour'"):
+        sb.colour  # noqa: B018

@@ -7,7 +7,7 @@ import pytest
 
 from spectral_core import standards
 from spectral_core.arrays import Float32Array
-from spectral_core.bake import level2_weights
+from spectral_core.baking import level2_weights
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
 from spectral_core.textures.pigments import PIGMENT_TEXTURES, PIGMENTS, WAVELENGTHS_NM, kubelka_munk, pigment_texture

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spectral_core.bake import bake
+from spectral_core.baking import bake
 from spectral_core.display import load_profile, srgb, srgb_encode
 from spectral_core.errors import OutputError, TextureError
 from spectral_core.imaging import oiio
