@@ -155,6 +155,24 @@ def percentiles(values: Float64Array) -> Percentiles:
 
 
 @dataclass(frozen=True)
+class TextureDifference:
+    """One textured object against its texture's exact colours.
+
+    Attributes
+    ----------
+    mean_colour
+        Largest channel difference of the object's mean colour: what the texture's values, their
+        storage and the lighting are off by.
+    pixels
+        Differences of single pixels: these add where within its pixel the renderer samples the
+        texture, which theory takes at the pixel's centre.
+    """
+
+    mean_colour: float
+    pixels: Spread
+
+
+@dataclass(frozen=True)
 class LightResult:
     """One light at all levels that were verified.
 
@@ -163,14 +181,14 @@ class LightResult:
     levels
         By level, 0 to 2.
     textures
-        Per textured object at level 2: 8-bit differences over its single pixels.
+        Per textured object at the highest level, in 8-bit levels.
     conditions
         What made this light numerically special, one sentence each.
     """
 
     name: str
     levels: dict[int, LevelResult]
-    textures: dict[str, Spread]
+    textures: dict[str, TextureDifference]
     conditions: tuple[str, ...]
 
     def to_json(self) -> dict[str, Any]:
@@ -180,9 +198,11 @@ class LightResult:
         return {"name": self.name, **levels, "textures": textures, "conditions": list(self.conditions)}
 
 
-def pixel_differences(rendered: Float64Array, exact: Float64Array) -> Spread:
-    """8-bit differences of pixels (n, 3) of linear RGB, clipped to 0..1 on both sides."""
-    return _spread(np.abs(_codes(rendered) - _codes(exact)))
+def texture_difference(rendered: Float64Array, exact: Float64Array) -> TextureDifference:
+    """8-bit differences of an object's pixels (n, 3) of linear RGB, clipped to 0..1 on both sides."""
+    means = [np.clip(each, 0.0, 1.0).mean(axis=0) for each in (rendered, exact)]
+    mean_colour = float(np.abs(_codes(means[0]) - _codes(means[1])).max())
+    return TextureDifference(mean_colour, _spread(np.abs(_codes(rendered) - _codes(exact))))
 
 
 def conditions(lighting: Lighting, clipped: dict[str, int], extended: dict[str, float]) -> tuple[str, ...]:

@@ -25,10 +25,10 @@ from spectral_core.verification import (
     LevelResult,
     LightResult,
     PatchReading,
-    Spread,
+    TextureDifference,
     compare,
     conditions,
-    pixel_differences,
+    texture_difference,
     worst_stages,
 )
 
@@ -92,7 +92,7 @@ def verify_steps(
     try:
         for index, light in enumerate(lights):
             found: dict[int, LevelResult] = {}
-            textures: dict[str, Spread] = {}
+            textures: dict[str, TextureDifference] = {}
             for level in levels:
                 yield Step((index + levels.index(level) / len(levels)) / len(lights), f"{light}, level {level}")
                 started = time.perf_counter()
@@ -232,7 +232,7 @@ def _read_textures(
     rendered: Float32Array,
     identity: measure.Identity,
     illumination: measure.Illumination,
-) -> dict[str, Spread]:
+) -> dict[str, TextureDifference]:
     """Per textured object, its pixels against the texture's exact colours at the same points."""
     surfaces = scene_surfaces(description)
     found = {}
@@ -242,7 +242,7 @@ def _read_textures(
         if surface.uniform or mask.sum() < _FEWEST_PIXELS:
             continue
         exact: Float64Array = measure.sample(applied.exact_rgb(surface), identity.uv[mask])
-        found[item.name] = pixel_differences(
+        found[item.name] = texture_difference(
             rendered[mask].astype(np.float64), exact * illumination.irradiance[mask][:, None]
         )
     return found

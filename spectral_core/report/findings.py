@@ -23,12 +23,12 @@ class Worst:
 
 @dataclass(frozen=True)
 class WorstTexture:
-    """8-bit levels over single pixels of textures: mean over objects and lights, largest and where."""
+    """The textured object whose mean colour is furthest off, in 8-bit levels, and single pixels on average."""
 
-    mean: float
-    max: float
+    mean_colour: float
     object: str
     light: str
+    pixels: float
 
 
 @dataclass(frozen=True)
@@ -113,14 +113,14 @@ def worst(document: Document, level: int) -> Worst | None:
 def worst_texture(document: Document) -> WorstTexture | None:
     """The headline figures of the textures at level 2; None if the scene has none."""
     found = [
-        (each["max"], each["mean"], name, light["name"])
+        (each["mean_colour"], name, light["name"], each["pixels"]["mean"])
         for light in document["lights"]
         for name, each in light.get("textures", {}).items()
     ]
     if not found:
         return None
-    largest = max(found)
-    return WorstTexture(sum(mean for _, mean, *_ in found) / len(found), largest[0], largest[2], largest[3])
+    mean_colour, name, light_name, _ = max(found)
+    return WorstTexture(mean_colour, name, light_name, sum(each[-1] for each in found) / len(found))
 
 
 def conditions_met(document: Document) -> list[LightConditions]:

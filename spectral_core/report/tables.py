@@ -169,18 +169,20 @@ def textures_table(document: Document) -> Table | None:
     objects = list(dict.fromkeys(name for light in lights for name in light.get("textures", {})))
     if not objects:
         return None
-    rows = [Row((name, *(_mean_and_max(light.get("textures", {}).get(name)) for light in lights))) for name in objects]
+    rows = [Row((name, *(_texture_cell(light.get("textures", {}).get(name)) for light in lights))) for name in objects]
     return Table(
-        f"{document['scene']}: hyperspectral textures at level 2, single pixels against the texture's exact colour at "
-        "the same point, both clipped to 0…255: mean / maximum over pixels and channels, 8-bit sRGB levels before "
-        "rounding.",
+        f"{document['scene']}: hyperspectral textures at level 2 against the texture's exact colours, both clipped to "
+        "0…255, 8-bit sRGB levels before rounding: the object's mean colour / single pixels on average. Single pixels "
+        "also differ because the renderer averages the texture over a pixel where theory takes its centre.",
         ("object", *(light["name"] for light in lights)),
         tuple(rows),
     )
 
 
-def _mean_and_max(spread_of: Mapping[str, float] | None) -> str:
-    return NONE if spread_of is None else f"{fixed(spread_of['mean'], 2)} / {fixed(spread_of['max'], 2)}"
+def _texture_cell(difference: Mapping[str, Any] | None) -> str:
+    if difference is None:
+        return NONE
+    return f"{fixed(difference['mean_colour'], 2)} / {fixed(difference['pixels']['mean'], 2)}"
 
 
 def stages_table(document: Document) -> Table | None:
