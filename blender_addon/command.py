@@ -69,17 +69,13 @@ def build(arguments: argparse.Namespace) -> Result:
 
 def render(arguments: argparse.Namespace) -> Result:
     """Render a .blend under a light at a level to PNG."""
-    from spectral_core.errors import BlenderError
-
     from .bridge import lighting
     from .bridge.render import render_png
 
     scene = _open(arguments.file)
-    if arguments.stereo:
-        raise BlenderError("stereo renders are not available yet", remedy="render without --stereo")
     applied = lighting.apply(scene, arguments.light or scene.spectral_booth.light, _level(arguments, scene))
     progress(0.1, f"rendering {applied.lighting.light.name}")
-    seconds = render_png(scene, arguments.output)
+    seconds = render_png(scene, arguments.output, arguments.stereo)
     return {
         "file": str(arguments.output),
         "light": applied.lighting.light.name,
@@ -187,7 +183,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("file", type=Path, nargs="?", help="a .blend; the open file if left out")
     command.add_argument("--light", help="name or file; the scene's own if left out")
     command.add_argument("--level", type=int, choices=(0, 1, 2))
-    command.add_argument("--stereo", action="store_true")
+    command.add_argument("--stereo", action="store_true", help="both eyes side by side")
     command.add_argument("-o", "--output", type=Path, required=True)
     command = verb("verify", verify)
     command.add_argument("file", type=Path, nargs="?", help="a .blend; the open file if left out")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -72,14 +73,14 @@ def verify(
     arguments = ["verify", str(file)]
     arguments += [part for light in lights for part in ("--light", light)]
     arguments += [part for level in levels for part in ("--level", level)]
-    arguments += ["--images", str(images)] if images else []
-    with progress_bar(f"verifying {file.name}") as progress:
+    with tempfile.TemporaryDirectory() as temporary, progress_bar(f"verifying {file.name}") as progress:
+        folder = images or Path(temporary)
+        arguments += ["--images", str(folder)] if images or report else []
         document = run_verb(arguments, progress)
-    failed = [each["name"] for each in document["lights"] if _largest(each) > limit]
-    document = {**document, "limit": limit, "failed": failed}
-    if report:
-        run = SceneRun(document, find_renders(images, document) if images else {}, file.parent)
-        write_report(report, ReportInput(chart=run))
+        failed = [each["name"] for each in document["lights"] if _largest(each) > limit]
+        document = {**document, "limit": limit, "failed": failed}
+        if report:
+            write_report(report, ReportInput(chart=SceneRun(document, find_renders(folder, document), file.parent)))
     emit(document, json, lambda console: console.print(table(_COLUMNS, verify_rows(document), document["scene"])))
     return 1 if failed else 0
 

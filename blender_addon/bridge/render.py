@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import time
 from collections.abc import Iterator
@@ -15,6 +16,11 @@ import numpy as np
 from spectral_core.arrays import Float32Array
 from spectral_core.errors import BlenderError
 from spectral_core.files import atomic_path
+
+from . import state
+
+# The mean distance of adults' pupils (Dodgson 2004).
+INTEROCULAR_M = 0.063
 
 
 @dataclass(frozen=True)
@@ -36,12 +42,41 @@ def render_linear(scene: bpy.types.Scene) -> Rendered:
         return Rendered(_read(path), seconds)
 
 
-def render_png(scene: bpy.types.Scene, path: Path) -> float:
-    """Render to an 8-bit PNG through the scene's view transform; returns the seconds it took."""
+def render_png(scene: bpy.types.Scene, path: Path, stereo: bool = False) -> float:
+    """Render to an 8-bit PNG through the scene's view transform; returns the seconds it took.
+
+    With `stereo` both eyes side by side, left eye left, converging where the camera looks.
+    """
     started = time.perf_counter()
-    with atomic_path(path) as temporary, _output(scene, temporary, "PNG", "8"):
+    with atomic_path(path) as temporary, _output(scene, temporary, "PNG", "8"), _both_eyes(scene, stereo):
         _render(scene)
     return time.perf_counter() - started
+
+
+@contextmanager
+def _both_eyes(scene: bpy.types.Scene, stereo: bool) -> Iterator[None]:
+    if not stereo:
+        yield
+        return
+    image, eyes = scene.render.image_settings, scene.camera.data.stereo
+    kept = (scene.render.use_multiview, scene.render.views_format, eyes.interocular_distance, eyes.convergence_distance)
+    scene.render.use_multiview, scene.render.views_format = True, "STEREO_3D"
+    image.views_format = "STEREO_3D"
+    image.stereo_3d_format.display_mode = "SIDEBYSIDE"
+    image.stereo_3d_format.use_squeezed_frame = False
+    eyes.interocular_distance = INTEROCULAR_M
+    # Parallel to what the camera looks at: there the two pictures coincide.
+    eyes.convergence_distance = _distance_to_target(scene)
+    try:
+        yield
+    finally:
+        scene.render.views_format, eyes.interocular_distance, eyes.convergence_distance = kept[1:]
+        scene.render.use_multiview = kept[0]
+
+
+def _distance_to_target(scene: bpy.types.Scene) -> float:
+    camera = state.description(scene).camera
+    return math.dist(camera.location, camera.target)
 
 
 def _render(scene: bpy.types.Scene) -> None:
