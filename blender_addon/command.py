@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from collections.abc import Callable, Sequence
@@ -240,6 +241,7 @@ def _save(path: Path) -> None:
     from spectral_core.files import atomic_path
 
     with atomic_path(path) as temporary:
+        temporary.unlink()  # Blender would keep the empty file as a backup
         bpy.ops.wm.save_as_mainfile(filepath=str(temporary), check_existing=False, compress=True, copy=True)
 
 
@@ -247,4 +249,8 @@ if __name__ == "__main__":
     from . import props
 
     props.register()
-    sys.exit(main())
+    code = main()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    # The bpy module's threads can deadlock when the interpreter ends; all results are written by now.
+    os._exit(code)
