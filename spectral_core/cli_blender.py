@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 from spectral_core.blender_process import run_verb
-from spectral_core.console import Document, emit, facts, progress_bar, table
+from spectral_core.console import Document, emit, facts, progress_bar, rounded, table
 from spectral_core.demo import run_demo
 from spectral_core.options import as_json
 from spectral_core.report.html import ReportInput, SceneRun, find_renders, write_report
@@ -81,7 +81,7 @@ def verify(
         document = {**document, "limit": limit, "failed": failed}
         if report:
             write_report(report, ReportInput(chart=SceneRun(document, find_renders(folder, document), file.parent)))
-    emit(document, json, lambda console: console.print(table(_COLUMNS, verify_rows(document), document["scene"])))
+    emit(document, json, lambda console: console.print(table(_COLUMNS, verify_rows(document), _title(document))))
     return 1 if failed else 0
 
 
@@ -101,11 +101,17 @@ def add_blender_commands(group: click.Group) -> None:
         group.add_command(command)
 
 
-_COLUMNS = ("light", "level", "R mean", "G mean", "B mean", "max (8-bit)", "dE00 mean", "dE00 max", "seconds")
+def _title(document: Document) -> str:
+    return f"{document['scene']}, Blender {document['blender']}: 8-bit differences per channel and dE00 from theory"
+
+
+_COLUMNS = ("light", "level", "R", "G", "B", "max", "dE00", "max", "s")
 
 
 def verify_rows(document: Document) -> list[list[object]]:
-    """One row per light and level for the terminal; differences over all patches, clipped."""
+    """One row per light and level for the terminal: mean 8-bit differences per channel over all
+    patches, clipped, and the largest; mean and largest dE00; seconds of switching and rendering.
+    """
     rows: list[list[object]] = []
     for light in document["lights"]:
         for level in ("level0", "level1", "level2"):
@@ -113,12 +119,10 @@ def verify_rows(document: Document) -> list[list[object]]:
                 continue
             result = light[level]
             rgb = [result["rgb8"][channel] for channel in "RGB"]
-            means = [each["mean"] for each in rgb]
+            levels = [*(each["mean"] for each in rgb), max(each["max"] for each in rgb)]
+            dE00 = [result["dE00"]["mean"], result["dE00"]["max"]]
             seconds = result["switch_seconds"] + result["render_seconds"]
-            dE00 = result["dE00"]
-            rows.append(
-                [light["name"], level[-1], *means, max(each["max"] for each in rgb), dE00["mean"], dE00["max"], seconds]
-            )
+            rows.append([light["name"], level[-1], *rounded(levels, 2), *rounded(dE00, 2), *rounded([seconds])])
     return rows
 
 

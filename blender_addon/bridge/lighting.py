@@ -45,6 +45,7 @@ def apply(scene: bpy.types.Scene, light_name: str, level: int) -> Applied:
         lamp.data.color = lighting.lamp_rgb.tolist()
     clipped, extended = {}, {}
     for name, material in state.managed_materials(scene).items():
+        materials.set_gloss_colour(material, lighting.gloss_rgb)
         clipped[name] = materials.set_colour(material, lighting.material_rgb(surfaces[name], reference))
         extended[name] = surfaces[name].extended(light) if level == 2 else 0.0
     scene.spectral_booth.light = light_name

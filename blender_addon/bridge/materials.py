@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import bpy
 import numpy as np
 
@@ -12,6 +15,7 @@ from .state import SURFACE_KEY
 
 DIFFUSE = "Spectral Diffuse"
 IMAGE = "Spectral Image"
+GLOSS = "Spectral Gloss"
 # Reflectance at normal incidence of the Fresnel node's IOR below; the gloss is relative to it.
 _FRESNEL_IOR = 1.5
 _FRESNEL_F0 = 0.04
@@ -73,29 +77,34 @@ def stored_colour(material: bpy.types.Material) -> Float64Array:
 
 def has_gloss(material: bpy.types.Material) -> bool:
     """Whether the material has a neutral gloss on top."""
-    return any(node.bl_idname == "ShaderNodeAddShader" for node in material.node_tree.nodes)
+    return GLOSS in material.node_tree.nodes
 
 
-def set_uniform(material: bpy.types.Material, value: float | None) -> None:
-    """Show a grey of `value` instead of the surface's colour; None shows the surface again.
+def set_gloss_colour(material: bpy.types.Material, rgb: Float64Array) -> None:
+    """Colour (3,) of the gloss relative to the lamps; white unless the light is in the materials."""
+    if has_gloss(material):
+        material.node_tree.nodes[GLOSS].inputs[0].default_value = rgb.tolist()
 
-    Only a link or a value changes; what the material stores of its surface stays.
-    """
+
+@contextmanager
+def uniform(material: bpy.types.Material, value: float) -> Iterator[None]:
+    """Show a grey of `value` under white gloss instead of the surface's colour; restored afterwards."""
     tree = material.node_tree
-    diffuse = tree.nodes[DIFFUSE]
-    socket = diffuse.inputs["Color"]
-    image = tree.nodes.get(IMAGE)
+    socket = tree.nodes[DIFFUSE].inputs["Color"]
+    sources = [link.from_socket for link in socket.links]
+    colour = tuple(socket.default_value)
+    gloss = np.array(tree.nodes[GLOSS].inputs[0].default_value) if has_gloss(material) else np.ones(3)
     for link in list(socket.links):
         tree.links.remove(link)
-    if value is not None:
-        if image is None:
-            material["spectral_booth_colour"] = list(socket.default_value)
-        socket.default_value = (value, value, value, 1.0)
-    elif image is not None:
-        tree.links.new(image.outputs["Color"], socket)
-    elif "spectral_booth_colour" in material:
-        socket.default_value = material["spectral_booth_colour"]
-        del material["spectral_booth_colour"]
+    socket.default_value = (value, value, value, 1.0)
+    set_gloss_colour(material, np.ones(3))
+    try:
+        yield
+    finally:
+        socket.default_value = colour
+        set_gloss_colour(material, gloss)
+        for source in sources:
+            tree.links.new(source, socket)
 
 
 def _add_image_node(material: bpy.types.Material, surface: Surface, diffuse: bpy.types.Node) -> None:
@@ -135,7 +144,13 @@ def _add_gloss(material: bpy.types.Material, diffuse: bpy.types.NodeSocket, surf
     glossy = nodes.new("ShaderNodeBsdfAnisotropic")
     glossy.location = (40, -160)
     glossy.inputs["Roughness"].default_value = surface.roughness
-    links.new(scale.outputs[0], glossy.inputs["Color"])
+    tint = nodes.new("ShaderNodeVectorMath")
+    tint.name = tint.label = GLOSS
+    tint.operation = "SCALE"
+    tint.location = (-140, -420)
+    tint.inputs[0].default_value = (1.0, 1.0, 1.0)
+    links.new(scale.outputs[0], tint.inputs["Scale"])
+    links.new(tint.outputs[0], glossy.inputs["Color"])
     total = nodes.new("ShaderNodeAddShader")
     total.location = (220, 0)
     links.new(diffuse, total.inputs[0])

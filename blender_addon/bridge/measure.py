@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 import bpy
@@ -93,18 +93,16 @@ def sample(image: Float64Array, uv: Float32Array) -> Float64Array:
 def _neutral(scene: bpy.types.Scene, value: float) -> Iterator[None]:
     """All surfaces of one grey, all lamps of unit colour; restored afterwards."""
     colours = [(lamp.data, tuple(lamp.data.color)) for lamp in state.managed_lamps(scene)]
-    managed = list(state.managed_materials(scene).values())
-    for data, _ in colours:
-        data.color = (1.0, 1.0, 1.0)
-    for material in managed:
-        materials.set_uniform(material, value)
-    try:
-        yield
-    finally:
-        for data, colour in colours:
-            data.color = colour
-        for material in managed:
-            materials.set_uniform(material, None)
+    with ExitStack() as stack:
+        for material in state.managed_materials(scene).values():
+            stack.enter_context(materials.uniform(material, value))
+        for data, _ in colours:
+            data.color = (1.0, 1.0, 1.0)
+        try:
+            yield
+        finally:
+            for data, colour in colours:
+                data.color = colour
 
 
 @contextmanager

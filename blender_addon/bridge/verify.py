@@ -101,7 +101,8 @@ def verify_steps(
                 rendered = render_linear(scene)
                 if images:
                     write_png(images / f"{file_name(light)}_level{level}.png", rendered.pixels)
-                diffuse = rendered.pixels - illumination.gloss[..., None] * applied.lighting.lamp_rgb.astype(np.float32)
+                gloss = (applied.lighting.lamp_rgb * applied.lighting.gloss_rgb).astype(np.float32)
+                diffuse = rendered.pixels - illumination.gloss[..., None] * gloss
                 readings = _read_patches(scene, description, applied.lighting, diffuse, identity, illumination)
                 found[level] = compare(readings, applied.lighting, switched, rendered.seconds)
                 if level == max(levels):
