@@ -18,8 +18,8 @@ from spectral_core.errors import LightError
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
 
-# The spectrum locus is used where the CIE 1931 chromaticity is known well enough to solve for:
-# beyond 700 nm it does not move.
+# The spectrum locus is used where the chromaticity is known well enough to solve for: beyond 700 nm
+# it does not move. The CIE 2015 observers begin at 390 nm.
 _LOCUS_NM = (380.0, 700.0)
 _BUILTIN_PEAK_NM = 456.0
 _SIMULATOR_XY = (0.3107, 0.3344)
@@ -38,11 +38,15 @@ def two_peak_metamer(
     Raises
     ------
     LightError
-        If the peak is outside 380 to 700 nm, or no second line gives the target (the line leaves
+        If the peak is outside 380 (the observer's first wavelength) to 700 nm, or no second line gives the target (the line leaves
         the gamut through the purples).
     """
-    if not _LOCUS_NM[0] <= first_peak_nm <= _LOCUS_NM[1]:
-        raise LightError(f"first peak {first_peak_nm:g} nm is outside 380 to 700 nm", remedy="give one inside")
+    shortest = max(_LOCUS_NM[0], float(standards.observer_table(observer)[0][0]))
+    longest = _LOCUS_NM[1]
+    if not shortest <= first_peak_nm <= longest:
+        raise LightError(
+            f"first peak {first_peak_nm:g} nm is outside {shortest:g} to {longest:g} nm", remedy="give one inside"
+        )
     target = np.asarray(target_xy, dtype=np.float64)
     first = _line_XYZ(first_peak_nm, observer)
     direction = target - _xy(first)
@@ -51,7 +55,7 @@ def two_peak_metamer(
         offset = _xy(_line_XYZ(wavelength, observer)) - target
         return float(direction[0] * offset[1] - direction[1] * offset[0])
 
-    for low, high in itertools.pairwise(np.arange(_LOCUS_NM[0], _LOCUS_NM[1] + 1)):
+    for low, high in itertools.pairwise(np.arange(shortest, longest + 1)):
         if side(low) * side(high) > 0 or low <= first_peak_nm <= high:
             continue
         wavelength = _bisect(side, low, high)

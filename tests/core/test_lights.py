@@ -72,6 +72,15 @@ def test_a_peak_without_a_partner_says_so(peak: float) -> None:
         light_design.two_peak_metamer(Light.builtin("D65").xy(), peak)
 
 
+def test_two_peaks_for_an_observer_that_begins_later() -> None:
+    """The CIE 2015 tables begin at 390 nm; below there is no chromaticity to solve for."""
+    target = Light.builtin("D65").xy("cie2015-2")
+    light = light_design.two_peak_metamer(target, 456.0, "cie2015-2")
+    np.testing.assert_allclose(light.xy("cie2015-2"), target, atol=1e-12)
+    with pytest.raises(LightError, match="outside 390 to 700"):
+        light_design.two_peak_metamer(target, 385.0, "cie2015-2")
+
+
 @pytest.mark.parametrize("rf", [60.0, 75.0, 88.0])
 def test_led_mixtures_meet_chromaticity_and_fidelity(rf: float) -> None:
     target = np.array([0.33, 0.34])
