@@ -118,14 +118,15 @@ def reflectance_document(spectra: Spectra, light: Light, profile: DisplayProfile
     factors = light.weighting_factors(spectra.wavelengths_nm, observer)
     XYZ = spectra.values @ factors.matrix
     Lab = standards.XYZ_to_Lab(XYZ, factors.white_XYZ)
-    codes = profile.to_codes(XYZ)
+    linear = profile.to_linear(XYZ)
+    codes = profile.model.encode(linear)
     colours = [
         {
             "name": name,
             "XYZ": XYZ[index].tolist(),
             "Lab": Lab[index].tolist(),
             "rgb_8bit": (255 * codes[index]).tolist(),
-            "in_gamut": bool(in_gamut(codes[index])),
+            "in_gamut": bool(in_gamut(linear[index])),
         }
         for index, name in enumerate(spectra.names)
     ]

@@ -8,6 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spectral_core.display import srgb
+from spectral_core.lights import Light
+
 Run = Callable[..., tuple[int, str, str]]
 
 
@@ -114,3 +117,17 @@ def test_the_public_names_are_there_whatever_was_imported_before() -> None:
         assert callable(getattr(sb, name))
     with pytest.raises(AttributeError, match="no attribute 'colour'"):
         sb.colour  # noqa: B018
+
+
+def test_the_gamut_s_tolerance_is_in_linear_light(document: Callable[..., dict[str, Any]], tmp_path: Path) -> None:
+    """Encoded, the same 1e-4 below zero would be 13 times that."""
+    nm = np.arange(380.0, 781.0, 5)
+    cyan = np.where((nm > 480) & (nm < 540), 0.9, 0.0)
+    red = srgb().to_linear(np.stack([cyan, np.ones_like(nm)]) @ Light.builtin("D65").weighting_factors(nm).matrix)[:, 0]
+    for wanted, inside in ((-5e-5, True), (-2e-4, False)):
+        share = (wanted - red[0]) / (red[1] - red[0])
+        path = tmp_path / "r.csv"
+        values = cyan + share * (1 - cyan)
+        path.write_text("nm,r\n" + "".join(f"{float(a)!r},{float(b)!r}\n" for a, b in zip(nm, values, strict=True)))
+        (colour,) = document("reflectance", path)["colours"]
+        assert colour["in_gamut"] is inside
