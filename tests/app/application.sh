@@ -27,9 +27,9 @@ stop() {
 }
 
 mirror() { # the first one in apt's own lists, in either of their two formats
-  local lists=(/etc/apt/sources.list /etc/apt/sources.list.d/*)
-  sed -nE 's/^URIs:[[:space:]]*([^[:space:]]+).*/\1/p; s/^deb[[:space:]]+(\[[^]]*\][[:space:]]+)?([^[:space:]]+).*/\2/p' \
-    "${lists[@]}" 2>/dev/null | head -n 1
+  local lists=(/etc/apt/sources.list /etc/apt/sources.list.d/*) # the first is missing on newer systems
+  { sed -nE 's/^URIs:[[:space:]]*([^[:space:]]+).*/\1/p; s/^deb[[:space:]]+(\[[^]]*\][[:space:]]+)?([^[:space:]]+).*/\2/p' \
+    "${lists[@]}" 2>/dev/null || true; } | head -n 1
 }
 
 within() { # a command inside the folder; what is mounted for it goes away with it
@@ -79,8 +79,18 @@ window)
   if [[ -n ${DISPLAY:-} && -n ${BLENDER:-} ]]; then
     "$blender" "$@"
   else
-    # -a finds a free screen number; the size leaves the window its full height.
-    inside xvfb-run -a -s "-screen 0 1600x1000x24 +extension GLX" "$blender" --window-geometry 0 0 1600 1000 "$@"
+    inside bash -c '
+      # Xvfb takes a free screen number and says which.
+      export XDG_RUNTIME_DIR=$(mktemp -d)
+      numbers=$XDG_RUNTIME_DIR/number
+      mkfifo "$numbers"
+      Xvfb -displayfd 3 -screen 0 1600x1000x24 +extension GLX 3>"$numbers" >/dev/null 2>&1 &
+      screen=$!
+      read -r number <"$numbers"
+      status=0
+      DISPLAY=:$number "$@" || status=$?
+      kill "$screen"
+      exit "$status"' window "$blender" --window-geometry 0 0 1600 1000 "$@"
   fi
   ;;
 remove) rm -rf "$root" ;;
