@@ -53,7 +53,7 @@ class Illumination:
 def identify(scene: bpy.types.Scene) -> Identity:
     """Render which object each pixel shows."""
     items = list(state.managed_objects(scene))
-    with _flat_override(scene):
+    with _all_emit_identity(scene):
         for index, item in enumerate(items):
             item.pass_index = index + 1
         pixels = render_linear(scene).pixels
@@ -127,17 +127,30 @@ def _cropped(scene: bpy.types.Scene, within: BoolArray | None) -> Iterator[None]
 
 
 @contextmanager
-def _flat_override(scene: bpy.types.Scene) -> Iterator[None]:
-    """Every surface emits (u, v, object number), one unfiltered sample a pixel."""
+def _all_emit_identity(scene: bpy.types.Scene) -> Iterator[None]:
+    """Every surface emits (u, v, object number), one unfiltered sample a pixel.
+
+    The slots are exchanged one by one: Eevee knows no material override before 5.0.
+    """
     material = _identity_material()
-    layer = scene.view_layers[0]
-    kept = (layer.material_override, scene.eevee.taa_render_samples, scene.render.filter_size)
-    layer.material_override = material
+    shown = [item for item in scene.objects if hasattr(item.data, "materials")]
+    bare = {item.data for item in shown if not item.data.materials}
+    for data in bare:
+        data.materials.append(None)
+    # All are read before the first is set, because objects may share their data.
+    slots = [(slot, slot.material) for item in shown for slot in item.material_slots]
+    kept = (scene.eevee.taa_render_samples, scene.render.filter_size)
     scene.eevee.taa_render_samples, scene.render.filter_size = 1, 0.0
+    for slot, _ in slots:
+        slot.material = material
     try:
         yield
     finally:
-        layer.material_override, scene.eevee.taa_render_samples, scene.render.filter_size = kept
+        for slot, before in slots:
+            slot.material = before
+        for data in bare:
+            data.materials.clear()
+        scene.eevee.taa_render_samples, scene.render.filter_size = kept
         bpy.data.materials.remove(material)
 
 

@@ -25,6 +25,7 @@ from spectral_core.verification import (
     LevelResult,
     LightResult,
     PatchReading,
+    Percentiles,
     TextureDifference,
     compare,
     conditions,
@@ -87,6 +88,10 @@ def verify_steps(
     yield Step(0.0, "what the camera sees")
     before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
     identity = measure.identify(scene)
+    if not any(mask.sum() >= _FEWEST_PIXELS for mask in identity.masks.values()):
+        raise BlenderError(
+            f"the camera of '{scene.name}' sees no spectral surface", remedy="aim it at some, or render larger"
+        )
     illumination = _illumination(scene, description, identity)
     results = []
     try:
@@ -120,10 +125,15 @@ def summary(results: Sequence[LightResult]) -> str:
     patches = max(level.patches for light in results for level in light.levels.values())
     lines = [f"{lights}, {patches} colours"]
     for level in sorted(results[0].levels):
-        dE00 = [light.levels[level].dE00 for light in results]
-        mean, largest = float(np.mean([each.mean for each in dE00])), max(each.max for each in dE00)
-        lines.append(f"Level {level}: dE00 {mean:.2f}, max {largest:.2f}")
+        found = [light.levels[level] for light in results]
+        lines.append(f"Level {level}: dE00 {_mean_and_max([each.dE00 for each in found])}")
+        if level == max(LEVELS) and any(each.in_gamut < each.patches for each in found):
+            lines.append(f"In gamut: dE00 {_mean_and_max([each.dE00_in_gamut for each in found])}")
     return "\n".join(lines)
+
+
+def _mean_and_max(spreads: Sequence[Percentiles]) -> str:
+    return f"{np.mean([each.mean for each in spreads]):.2f}, max {max(each.max for each in spreads):.2f}"
 
 
 def document(scene: bpy.types.Scene, results: Sequence[LightResult], seconds: float) -> Document:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
@@ -35,30 +35,21 @@ def empty_file(request: pytest.FixtureRequest) -> Iterator[None]:
         bpy.ops.wm.save_as_mainfile(filepath=str((FAILED / f"{name}.blend").resolve()), copy=True)
 
 
-@pytest.fixture
-def small() -> Callable[[str], str]:
-    """Make a scene description's render tiny: the renderer runs in software."""
-
-    def shrink(text: str) -> str:
-        for key, value in (
-            ("width = 640", "width = 160"),
-            ("height = 480", "height = 120"),
-            ("samples = 8", "samples = 1"),
-        ):
-            assert key in text
-            text = text.replace(key, value)
-        return text
-
-    return shrink
+def shrunk(text: str) -> str:
+    """A scene description with a tiny render: the renderer runs in software."""
+    for key, value in (("width", 160), ("height", 120), ("samples", 1)):
+        text, count = re.subn(rf"^{key} = \d+$", f"{key} = {value}", text, flags=re.MULTILINE)
+        assert count == 1, key
+    return text
 
 
 @pytest.fixture
-def chart_toml(tmp_path: Path, small: Callable[[str], str]) -> Path:
+def chart_toml(tmp_path: Path) -> Path:
     """The ColorChecker with a tiny render."""
     from spectral_core.scene import bundled_scene
 
     path = tmp_path / "chart.toml"
-    path.write_text(small(bundled_scene("colorchecker").read_text(encoding="utf-8")), encoding="utf-8")
+    path.write_text(shrunk(bundled_scene("colorchecker").read_text(encoding="utf-8")), encoding="utf-8")
     return path
 
 

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from conftest import shrunk
 
 
 def _command(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -16,6 +17,7 @@ def _command(*arguments: object) -> subprocess.CompletedProcess[str]:
         capture_output=True,
         text=True,
         check=False,
+        timeout=300,
     )
 
 
@@ -34,8 +36,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = tmp_path_factory.mktemp("command")
     text = bundled_scene("colorchecker").read_text(encoding="utf-8")
-    text = text.replace("width = 640", "width = 160").replace("height = 480", "height = 120")
-    (folder / "chart.toml").write_text(text.replace("samples = 8", "samples = 1"), encoding="utf-8")
+    (folder / "chart.toml").write_text(shrunk(text), encoding="utf-8")
     result = folder / "result.json"
     done = _command("build", folder / "chart.toml", "-o", folder / "chart.blend", "--result", result)
     assert done.returncode == 0, done.stderr

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 
 import bpy
@@ -86,7 +85,7 @@ def test_a_texture_renders_as_its_spectra_say(textured: bpy.types.Scene) -> None
     assert result.levels[2].patches == 2
 
 
-def test_render_writes_a_picture(chart: bpy.types.Scene, tmp_path: Path, small: Callable[[str], str]) -> None:
+def test_render_writes_a_picture(chart: bpy.types.Scene, tmp_path: Path) -> None:
     assert bpy.ops.spectral_booth.render(filepath=str(tmp_path / "chart")) == {"FINISHED"}
     image = bpy.data.images.load(str(tmp_path / "chart.png"))
     assert tuple(image.size) == (160, 120)

@@ -15,6 +15,7 @@ _FRESH = """
 import sys, bpy, blender_addon
 blender_addon.register()
 print(sorted({name.split(".")[0] for name in sys.modules} & {"spectral_core", "colour", "OpenImageIO"}))
+blender_addon.unregister()  # or the bpy module of 4.5 crashes when it ends
 """
 
 

@@ -53,7 +53,7 @@ def test_build_makes_the_scene_that_the_description_says(chart: bpy.types.Scene)
     _assert_shows(chart, "D65", 2)
 
 
-@pytest.mark.parametrize("preset", ["colorchecker"])
+@pytest.mark.parametrize("preset", ["booth", "colorchecker"])
 def test_presets_come_with_the_addon(preset: str) -> None:
     assert bpy.ops.spectral_booth.build(preset=preset, calibrate=False) == {"FINISHED"}
     assert bpy.context.scene.spectral_booth.is_managed
