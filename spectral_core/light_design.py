@@ -38,8 +38,8 @@ def two_peak_metamer(
     Raises
     ------
     LightError
-        If the peak is outside 380 (the observer's first wavelength) to 700 nm, or no second line gives the target (the line leaves
-        the gamut through the purples).
+        If the peak is outside 380 nm (or the observer's first wavelength) to 700 nm, or no second
+        line gives the target (the line leaves the gamut through the purples).
     """
     shortest = max(_LOCUS_NM[0], float(standards.observer_table(observer)[0][0]))
     longest = _LOCUS_NM[1]
