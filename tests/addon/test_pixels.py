@@ -59,7 +59,7 @@ def test_the_operator_verifies_and_writes_its_figures(chart_toml: Path, tmp_path
     assert bpy.ops.spectral_booth.verify(lights="CURRENT", write_json=True) == {"FINISHED"}
     first, *levels = scene.spectral_booth.result.split("\n")
     assert first == "D65, 24 colours"
-    assert [line.split(":")[0] for line in levels] == ["Level 0", "Level 1", "Level 2"]
+    assert [line.split(":")[0] for line in levels] == ["Level 0", "Level 1", "Level 2", "In gamut"]
     document = json.loads((tmp_path / "chart.verify.json").read_text(encoding="utf-8"))
     assert [light["name"] for light in document["lights"]] == ["D65"]
     assert {"level0", "level1", "level2"} <= document["lights"][0].keys()
@@ -78,9 +78,13 @@ def test_a_verification_that_stops_early_puts_the_light_back(chart: bpy.types.Sc
 
 def test_a_texture_renders_as_its_spectra_say(textured: bpy.types.Scene) -> None:
     (result,) = verify.verify(textured, ["A"], levels=(2,))
-    # The renderer's bilinear fraction has 8 bits, and where the texture repeats at its border the
-    # filter bends a steep edge: half a level on average. Flipped or a texel off, it is tens.
-    assert result.textures["panel"].mean < 0.5
+    panel = result.textures["panel"]
+    print(panel)
+    # The renderer's bilinear fraction has 8 bits, and one sample a pixel stands beside its centre:
+    # half a level on average, which the mean over the object does away with. A texture flipped or a
+    # texel off is off by tens.
+    assert panel.pixels.mean < 0.5
+    assert panel.mean_colour < 0.2
     # Only the frame and the white stay in sight beside it: they are what is counted then.
     assert result.levels[2].patches == 2
 
