@@ -11,6 +11,7 @@ import warnings
 from functools import cache
 from types import ModuleType
 from typing import Any
+from unittest.mock import NonCallableMock
 
 import numpy as np
 
@@ -28,18 +29,18 @@ DEFAULT_OBSERVER = "cie1931-2"
 
 @cache
 def _colour() -> ModuleType:
-    """Import colour-science quietly and leave no trace of a missing matplotlib.
+    """Import colour-science quietly and leave no trace of packages that are missing.
 
-    Without matplotlib, colour-science puts mocks in ``sys.modules`` that break every other user
-    of the process (other Blender add-ons); they are taken out again.
+    For a missing matplotlib or scipy colour-science puts mocks in ``sys.modules``, which any other
+    code of the process (other Blender add-ons) would take for the real thing; they are taken out.
     """
-    had = {name for name in sys.modules if name.split(".")[0] == "matplotlib"}
+    before = set(sys.modules)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         import colour
 
-    for name in [name for name in sys.modules if name.split(".")[0] == "matplotlib"]:
-        if name not in had and type(sys.modules[name]).__module__.startswith("unittest"):
+    for name in set(sys.modules) - before:
+        if isinstance(sys.modules[name], NonCallableMock):
             del sys.modules[name]
     return colour
 

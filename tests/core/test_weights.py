@@ -126,3 +126,12 @@ def test_invisible_light_is_refused() -> None:
         weighting_factors(np.array([900.0]), np.array([1.0]), BANDS)
     with pytest.raises(SpectrumError):
         interpolation_operator(BANDS, BANDS, "nearest")
+
+
+def test_colour_science_leaves_no_mocks_behind() -> None:
+    """Without scipy or matplotlib it replaces them in the whole process."""
+    import sys
+    from unittest.mock import NonCallableMock
+
+    standards.colour_science_version()
+    assert not [name for name, module in sys.modules.items() if isinstance(module, NonCallableMock)]
