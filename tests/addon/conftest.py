@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
@@ -35,12 +35,18 @@ def empty_file(request: pytest.FixtureRequest) -> Iterator[None]:
         bpy.ops.wm.save_as_mainfile(filepath=str((FAILED / f"{name}.blend").resolve()), copy=True)
 
 
-def shrunk(text: str) -> str:
+def _shrunk(text: str) -> str:
     """A scene description with a tiny render: the renderer runs in software."""
     for key, value in (("width", 160), ("height", 120), ("samples", 1)):
         text, count = re.subn(rf"^{key} = \d+$", f"{key} = {value}", text, flags=re.MULTILINE)
         assert count == 1, key
     return text
+
+
+@pytest.fixture(scope="session")
+def shrunk() -> Callable[[str], str]:
+    """Makes the render of a scene description tiny."""
+    return _shrunk
 
 
 @pytest.fixture
@@ -49,7 +55,7 @@ def chart_toml(tmp_path: Path) -> Path:
     from spectral_core.scene import bundled_scene
 
     path = tmp_path / "chart.toml"
-    path.write_text(shrunk(bundled_scene("colorchecker").read_text(encoding="utf-8")), encoding="utf-8")
+    path.write_text(_shrunk(bundled_scene("colorchecker").read_text(encoding="utf-8")), encoding="utf-8")
     return path
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import shrunk
 
 
 def _command(*arguments: object) -> subprocess.CompletedProcess[str]:
@@ -31,7 +31,7 @@ def _refused(done: subprocess.CompletedProcess[str]) -> str:
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built(tmp_path_factory: pytest.TempPathFactory, shrunk: Callable[[str], str]) -> Path:
     from spectral_core.scene import bundled_scene
 
     folder = tmp_path_factory.mktemp("command")
