@@ -12,6 +12,7 @@ import click
 from spectral_core import documents
 from spectral_core.baking import bake
 from spectral_core.cli_blender import add_blender_commands
+from spectral_core.cli_display import add_display_commands
 from spectral_core.console import cell, emit, facts, progress_bar, rounded, table
 from spectral_core.display import load_profile
 from spectral_core.errors import LightError, SpectralBoothError
@@ -169,6 +170,7 @@ def bake_command(
     emit(document, json, lambda console: console.print(table(("file", "light", "level", "share clipped"), rows)))
 
 
+add_display_commands(cli)
 add_blender_commands(cli)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import numpy as np
 from spectral_core import light_design, standards, weights
 from spectral_core.arrays import Float64Array
 from spectral_core.display import DisplayProfile, srgb
+from spectral_core.display.characterise import Characterisation
+from spectral_core.display.measurements import Measurements
 from spectral_core.display.profile import in_gamut
 from spectral_core.errors import LightError, TextureError
 from spectral_core.lights import Light, LightQuality, builtin_names
@@ -19,6 +22,7 @@ from spectral_core.textures import HyperspectralTexture
 
 __all__ = [
     "bake_document",
+    "characterise_document",
     "design",
     "design_table",
     "light_document",
@@ -183,6 +187,30 @@ def pixel_document(
         document["rgb_8bit"] = (255 * srgb().to_codes(XYZ)).tolist()
         document["warnings"] += _extension(factors)
     return document
+
+
+def characterise_document(found: Characterisation, original: Measurements) -> Document:
+    """`characterise`: XYZ in the units of the file."""
+    return {
+        "model": found.chosen.name,
+        "models": [
+            {
+                "name": each.name,
+                "held_out": asdict(each.held_out) if each.held_out else None,
+                "fit": asdict(each.fit),
+                "nanoseconds_per_pixel": each.nanoseconds,
+            }
+            for each in found.models
+        ],
+        "gamma": {channel: {"value": value, "r2": r2} for channel, (value, r2) in found.gamma.items()},
+        "additivity_error": found.checks.additivity_error,
+        "additivity_XYZ": found.checks.additivity_XYZ.tolist(),
+        "black_XYZ": original.black_XYZ.tolist(),
+        "white_XYZ": original.white_XYZ.tolist(),
+        "unit": original.unit,
+        "noise_dE00": found.checks.noise_dE00,
+        "warnings": list(found.warnings),
+    }
 
 
 def long_lists(document: Document) -> list[str]:

@@ -55,6 +55,24 @@ def srgb_decode(codes: FloatArray) -> Float64Array:
     return np.asarray(np.sign(codes) * np.where(magnitude <= 0.04045, magnitude / 12.92, curve))
 
 
+def checked_vector(name: str, values: Float64Array) -> Float64Array:
+    """Three finite numbers, frozen."""
+    vector = frozen(values)
+    if vector.shape != (3,) or not np.isfinite(vector).all():
+        raise DisplayError(f"'{name}' must be three finite numbers", remedy="correct the profile")
+    return vector
+
+
+def checked_matrix(values: Float64Array) -> Float64Array:
+    """An invertible (3, 3) matrix, frozen."""
+    matrix = frozen(values)
+    if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
+        raise DisplayError("'matrix' must be 3 x 3 finite numbers", remedy="correct the profile")
+    if np.linalg.cond(matrix) > 1e8:
+        raise DisplayError("'matrix' cannot be inverted: its primaries lie on a line", remedy="correct the profile")
+    return matrix
+
+
 @dataclass(frozen=True)
 class GammaMatrix:
     """The published model: a gamma per channel, a matrix, a black (Diaz-Barrancas et al. 2020).
@@ -76,15 +94,11 @@ class GammaMatrix:
     black_XYZ: Float64Array
 
     def __post_init__(self) -> None:
-        for name, shape in (("gamma", (3,)), ("matrix", (3, 3)), ("black_XYZ", (3,))):
-            value = frozen(getattr(self, name))
-            if value.shape != shape or not np.isfinite(value).all():
-                raise DisplayError(f"'{name}' must be {shape} finite numbers", remedy="correct the profile")
-            object.__setattr__(self, name, value)
+        object.__setattr__(self, "gamma", checked_vector("gamma", self.gamma))
+        object.__setattr__(self, "matrix", checked_matrix(self.matrix))
+        object.__setattr__(self, "black_XYZ", checked_vector("black_XYZ", self.black_XYZ))
         if (self.gamma <= 0).any():
             raise DisplayError("'gamma' must be above 0", remedy="correct the profile")
-        if np.linalg.cond(self.matrix) > 1e8:
-            raise DisplayError("'matrix' cannot be inverted: its primaries lie on a line", remedy="correct the profile")
 
     def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3) of device codes (..., 3)."""
@@ -101,6 +115,15 @@ class GammaMatrix:
     def inverse(self, XYZ: FloatArray) -> Float64Array:
         """Device codes (..., 3) of XYZ (..., 3), not clipped."""
         return self.encode(self.linear(XYZ))
+
+    def to_json(self) -> dict[str, object]:
+        """Plain numbers."""
+        return {name: getattr(self, name).tolist() for name in ("gamma", "matrix", "black_XYZ")}
+
+    @classmethod
+    def from_json(cls, document: dict[str, object]) -> GammaMatrix:
+        """From `to_json`."""
+        return cls(*(np.asarray(document[name], dtype=np.float64) for name in ("gamma", "matrix", "black_XYZ")))
 
 
 @dataclass(frozen=True)

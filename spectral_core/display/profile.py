@@ -10,12 +10,21 @@ from typing import Any
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array, FloatArray
+from spectral_core.display.corrected import CorrectedLut
 from spectral_core.display.models import DisplayModel, GammaMatrix, SRGBCurve
+from spectral_core.display.tone_models import GainOffsetGamma, LutMatrix
 from spectral_core.errors import DisplayError
 from spectral_core.files import atomic_path
 
 _FORMAT = "spectral-booth display profile"
 _VERSION = 1
+# Models that a profile may hold, by their type in the file.
+MODELS: dict[str, Any] = {
+    "gamma-matrix": GammaMatrix,
+    "gain-offset-gamma": GainOffsetGamma,
+    "lut-matrix": LutMatrix,
+    "corrected-lut": CorrectedLut,
+}
 # CIE D65's table differs from sRGB's rounded white point by 9e-5 in linear RGB: the display's own
 # white is not out of its gamut.
 GAMUT_TOLERANCE = 1e-4
@@ -33,11 +42,14 @@ class DisplayProfile:
         Device codes to XYZ (white Y = 1) and back.
     source
         Where its numbers are from.
+    white_Y
+        Luminance of white in the units it was measured in (cd/m2 or relative); 1 if not measured.
     """
 
     name: str
     model: DisplayModel
     source: str = ""
+    white_Y: float = 1.0
 
     def to_XYZ(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3), white Y = 1, of device codes (..., 3) from 0 to 1."""
@@ -59,20 +71,17 @@ def in_gamut(values: FloatArray) -> BoolArray:
 
 def write_profile(profile: DisplayProfile, path: Path) -> None:
     """Write a profile as JSON that `read_profile` gives back bit for bit."""
-    if not isinstance(profile.model, GammaMatrix):
+    kind = next((name for name, model in MODELS.items() if isinstance(profile.model, model)), None)
+    if kind is None:
         raise DisplayError(f"'{profile.name}' is built in", remedy="name it instead of writing it")
-    model = profile.model
+    model: Any = profile.model
     document = {
         "format": _FORMAT,
         "version": _VERSION,
         "name": profile.name,
         "source": profile.source,
-        "model": {
-            "type": "gamma-matrix",
-            "gamma": model.gamma.tolist(),
-            "matrix": model.matrix.tolist(),
-            "black_XYZ": model.black_XYZ.tolist(),
-        },
+        "white_Y": profile.white_Y,
+        "model": {"type": kind, **model.to_json()},
     }
     with atomic_path(path) as temporary:
         temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
@@ -93,23 +102,23 @@ def read_profile(path: Path) -> DisplayProfile:
             where=path,
             remedy=f"it must say format '{_FORMAT}', version {_VERSION}",
         )
-    model = document.get("model")
-    if not isinstance(model, dict) or model.get("type") != "gamma-matrix":
-        raise DisplayError("has no model of type 'gamma-matrix'", where=path, remedy="characterise the display again")
+    model, white_Y = document.get("model"), document.get("white_Y", 1.0)
+    kind = MODELS.get(str(model.get("type"))) if isinstance(model, dict) else None
+    if kind is None or not isinstance(model, dict):
+        raise DisplayError("has no model of a known type", where=path, remedy=f"known are {', '.join(MODELS)}")
+    if isinstance(white_Y, bool) or not isinstance(white_Y, (int, float)) or not 0 < white_Y < np.inf:
+        raise DisplayError("'white_Y' is no luminance", where=path, remedy="correct the profile")
     try:
-        parameters = {key: np.asarray(model[key], dtype=np.float64) for key in ("gamma", "matrix", "black_XYZ")}
+        made = kind.from_json(model)
     except KeyError as error:
         raise DisplayError(f"the model lacks {error}", where=path, remedy="correct the profile") from None
     except (TypeError, ValueError):
         raise DisplayError(
             "the model holds something that is no number", where=path, remedy="correct the profile"
         ) from None
-    try:
-        return DisplayProfile(
-            str(document.get("name", path.stem)), GammaMatrix(**parameters), str(document.get("source", ""))
-        )
     except DisplayError as error:
         raise DisplayError(error.problem, where=path, remedy=error.remedy) from None
+    return DisplayProfile(str(document.get("name", path.stem)), made, str(document.get("source", "")), float(white_Y))
 
 
 def _json(path: Path) -> dict[str, Any]:

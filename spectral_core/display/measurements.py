@@ -1,0 +1,245 @@
+"""Measurements of a display: device codes and the XYZ they gave, from every format people have."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from spectral_core import weights
+from spectral_core.arrays import BoolArray, Float64Array, frozen
+from spectral_core.display.cgats import parse_cgats
+from spectral_core.errors import DisplayError, SpectrumError
+from spectral_core.spectra import read_text
+from spectral_core.standards import DEFAULT_OBSERVER
+
+_NAMED_CODES = {
+    "red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0),
+    "white": (1.0, 1.0, 1.0), "black": (0.0, 0.0, 0.0),
+}  # fmt: skip
+_LUMINANCE_HEADERS = ("l", "y_relative", "lv", "luminance", "luminance_cd_m2", "y_cd_m2")
+# Codes of the same patch may differ by the rounding of their file, less than a quarter of an 8-bit level.
+SAME_CODE = 1e-3
+
+
+@dataclass(frozen=True)
+class Measurements:
+    """Patches of a display.
+
+    Attributes
+    ----------
+    codes
+        (n, 3), 0..1.
+    XYZ
+        (n, 3), in the file's units.
+    unit
+        ``cd/m2`` or ``relative`` (white at about 100).
+    instrument
+        What measured, as the file says.
+    warnings
+        What a user should know of the file.
+    """
+
+    codes: Float64Array
+    XYZ: Float64Array
+    unit: str = "relative"
+    instrument: str = ""
+    warnings: tuple[str, ...] = ()
+
+    def subset(self, chosen: BoolArray | np.ndarray) -> Measurements:  # type: ignore[type-arg]
+        """The patches of a mask or of indices."""
+        return Measurements(
+            frozen(self.codes[chosen]), frozen(self.XYZ[chosen]), self.unit, self.instrument, self.warnings
+        )
+
+    @property
+    def grey(self) -> BoolArray:
+        """(n,) True for equal codes, black and white included."""
+        return np.asarray(np.ptp(self.codes, axis=1) < SAME_CODE)
+
+    def channel(self, index: int) -> BoolArray:
+        """(n,) True where only one channel is driven."""
+        others = np.delete(self.codes, index, axis=1)
+        return np.asarray((others < SAME_CODE).all(axis=1) & (self.codes[:, index] >= SAME_CODE))
+
+    @property
+    def mixed(self) -> BoolArray:
+        """(n,) True for colours that are neither grey nor of one channel."""
+        return ~(self.grey | self.channel(0) | self.channel(1) | self.channel(2))
+
+    def at(self, *code: float) -> Float64Array | None:
+        """Mean XYZ (3,) of the patches with this code, None if there is none."""
+        found = (np.abs(self.codes - code) < SAME_CODE).all(axis=1)
+        return np.asarray(self.XYZ[found].mean(axis=0)) if found.any() else None
+
+    @property
+    def white_XYZ(self) -> Float64Array:
+        """Mean XYZ (3,) of white."""
+        white = self.at(1, 1, 1)
+        assert white is not None  # checked when the file was read
+        return white
+
+    @property
+    def black_XYZ(self) -> Float64Array:
+        """Mean XYZ (3,) of black; zero if it was not measured."""
+        black = self.at(0, 0, 0)
+        return np.zeros(3) if black is None else black
+
+
+def read_measurements(path: str | Path, observer: str = DEFAULT_OBSERVER) -> Measurements:
+    """Read ``.ti3``, CSV with ``R,G,B,X,Y,Z`` or ``R,G,B,x,y,Y``, or CSV with named rows (Red, ...).
+
+    Raises
+    ------
+    DisplayError
+        If the file is none of these, lacks white or a primary, or contradicts itself.
+    """
+    path = Path(path)
+    try:
+        text = read_text(path)
+    except SpectrumError as error:
+        raise DisplayError(error.problem, where=path, remedy=error.remedy) from None
+    measured = _from_cgats(text, path, observer) if "BEGIN_DATA_FORMAT" in text else _from_csv(text, path)
+    _refuse_contradictions(measured, path)
+    return measured
+
+
+def _from_cgats(text: str, path: Path, observer: str) -> Measurements:
+    table = parse_cgats(text, path)
+    codes = table.stacked(("RGB_R", "RGB_G", "RGB_B"))
+    XYZ = table.stacked(("XYZ_X", "XYZ_Y", "XYZ_Z"))
+    warnings: list[str] = []
+    from_spectra = _spectral_XYZ(table.columns, observer)
+    if codes is None or (XYZ is None and from_spectra is None):
+        raise DisplayError("lacks RGB_R... or XYZ_X... columns", where=path, remedy="give a .ti3 of a display")
+    if XYZ is None:
+        assert from_spectra is not None
+        XYZ = from_spectra
+    elif from_spectra is not None:
+        warnings += _disagreement(XYZ, from_spectra)
+    relative = table.keywords.get("NORMALIZED_TO_Y_100", "NO").upper() == "YES"
+    instrument = table.keywords.get("TARGET_INSTRUMENT", "")
+    return Measurements(
+        frozen(codes / 100), frozen(XYZ), "relative" if relative else "cd/m2", instrument, tuple(warnings)
+    )
+
+
+def _spectral_XYZ(columns: dict[str, Float64Array], observer: str) -> Float64Array | None:
+    """XYZ (n, 3) of emission spectra, white at Y = 100; None without spectra."""
+    names = [name for name in columns if name.startswith("SPEC_")]
+    if len(names) < 3:
+        return None
+    nm = np.array([float(name.removeprefix("SPEC_")) for name in names])
+    order = np.argsort(nm)
+    power = np.stack([columns[names[index]] for index in order], axis=1)
+    XYZ = (power * weights.quadrature_widths(nm[order])) @ weights.colour_matching(nm[order], observer)
+    return np.asarray(100 * XYZ / XYZ[:, 1].max())
+
+
+def _disagreement(XYZ: Float64Array, spectral: Float64Array) -> list[str]:
+    """One warning if the instrument's XYZ and its spectra differ by more than rounding."""
+    scaled = spectral * (XYZ[:, 1].max() / spectral[:, 1].max())
+    worst = float(np.abs(scaled - XYZ).max() / XYZ[:, 1].max())
+    return [f"the instrument's XYZ and its spectra differ by up to {worst:.2%} of white"] if worst > 1e-3 else []
+
+
+def _from_csv(text: str, path: Path) -> Measurements:
+    lines = [
+        (number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
+    ]
+    if len(lines) < 2:
+        raise DisplayError("holds no measurements", where=path, remedy="give a header and one row a patch")
+    delimiter = max(",;\t", key=lines[0][1].count)
+    rows = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), delimiter=delimiter))
+    header = [cell.strip() for cell in rows[0]]
+    body = [(number, [cell.strip() for cell in row]) for (number, _), row in zip(lines[1:], rows[1:], strict=True)]
+    for number, row in body:
+        if len(row) != len(header):
+            raise DisplayError(
+                f"{len(row)} columns, the header has {len(header)}",
+                where=f"{path}, line {number}",
+                remedy="correct the row",
+            )
+    if header[0].casefold() in ("color", "colour", "channel", "name", "patch"):
+        return _named_rows(header, body, path)
+    if header[:3] != ["R", "G", "B"] or header[3:6] not in (["X", "Y", "Z"], ["x", "y", "Y"]):
+        raise DisplayError(
+            f"the header is {','.join(header[:6])}",
+            where=path,
+            remedy="give R,G,B,X,Y,Z or R,G,B,x,y,Y, or named rows with L,x,y",
+        )
+    table = np.array([[_value(cell, path, number) for cell in row[:6]] for number, row in body])
+    codes = table[:, :3] / (255.0 if table[:, :3].max() > 1 else 1.0)
+    XYZ = table[:, 3:] if header[3] == "X" else _xyY_to_XYZ(table[:, 3:], path)
+    return Measurements(frozen(codes), frozen(XYZ), "relative" if abs(XYZ[:, 1].max() - 100) < 1 else "cd/m2")
+
+
+def _named_rows(header: list[str], body: list[tuple[int, list[str]]], path: Path) -> Measurements:
+    """Rows Red, Green, Blue, White, perhaps Black, with luminance, x and y."""
+    keys = [name.casefold() for name in header]
+    luminance = next((keys.index(each) for each in _LUMINANCE_HEADERS if each in keys), None)
+    if luminance is None and "Y" in header:
+        luminance = header.index("Y")
+    if luminance is None or "x" not in keys or "y" not in keys:
+        raise DisplayError(
+            f"the header is {','.join(header)}", where=path, remedy="give a name, the luminance, x and y"
+        )
+    columns = (
+        header.index("x") if "x" in header else keys.index("x"),
+        header.index("y") if "y" in header else keys.index("y"),
+    )
+    codes, xyY = [], []
+    for number, row in body:
+        name = row[0].casefold()
+        if name not in _NAMED_CODES:
+            raise DisplayError(
+                f"'{row[0]}' is no known patch", where=f"{path}, line {number}", remedy=f"use {', '.join(_NAMED_CODES)}"
+            )
+        codes.append(_NAMED_CODES[name])
+        xyY.append([_value(row[index], path, number) for index in (*columns, luminance)])
+    relative = keys[luminance] == "y_relative"
+    return Measurements(frozen(codes), frozen(_xyY_to_XYZ(np.array(xyY), path)), "relative" if relative else "cd/m2")
+
+
+def _xyY_to_XYZ(xyY: Float64Array, path: Path) -> Float64Array:
+    x, y, Y = xyY.T
+    if not ((y > 0) | (Y == 0)).all() or (Y < 0).any():
+        raise DisplayError("a chromaticity y or a luminance is not above 0", where=path, remedy="correct the reading")
+    safe = np.where(y > 0, y, 1.0)
+    return np.stack([x / safe * Y, Y, (1 - x - y) / safe * Y], axis=1)
+
+
+def _value(cell: str, path: Path, number: int) -> float:
+    try:
+        value = float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        raise DisplayError(f"'{cell}' is no finite number", where=f"{path}, line {number}", remedy="correct the cell")
+    return value
+
+
+def _refuse_contradictions(measured: Measurements, path: Path) -> None:
+    if (measured.codes < 0).any() or (measured.codes > 1 + SAME_CODE).any():
+        raise DisplayError("device codes outside 0..1 (or 0..255)", where=path, remedy="state codes 0..1 or 0..255")
+    for name in ("white", "red", "green", "blue"):
+        XYZ = measured.at(*_NAMED_CODES[name])
+        if XYZ is None:
+            raise DisplayError(
+                f"full {name} was not measured",
+                where=path,
+                remedy="measure white and the three primaries at full drive",
+            )
+        if not XYZ[1] > 0:
+            raise DisplayError(f"full {name} has no luminance", where=path, remedy="measure it again")
+        if name != "white" and XYZ[1] > measured.white_XYZ[1]:
+            raise DisplayError(
+                f"{name} ({XYZ[1]:.4g}) is brighter than white ({measured.white_XYZ[1]:.4g}): "
+                "the readings contradict each other",
+                where=path,
+                remedy="measure again with the display's state fixed",
+            )
