@@ -17,6 +17,7 @@ import numpy as np
 from spectral_core import standards, weights
 from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.errors import LightError, SpectrumError
+from spectral_core.files import is_file
 from spectral_core.spectra import Spectra, read_spectra
 from spectral_core.standards import DEFAULT_OBSERVER
 
@@ -132,7 +133,7 @@ class Light:
         key = _key(text)
         if key in _ALIASES or key in {_key(each) for each in builtin_names()}:
             return cls.builtin(text)
-        if not looks_like_file and not path.is_file():
+        if not looks_like_file and not is_file(path):
             return cls.builtin(text)
         return light_from_spectra(read_spectra(path, "power"), path)
 

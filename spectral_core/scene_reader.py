@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from spectral_core.errors import SceneError
+from spectral_core.files import read_text
 
 _REQUIRED: Any = object()
 Vector = tuple[float, float, float]
@@ -124,14 +125,7 @@ def read_toml(path: Path) -> tuple[str, TableReader]:
     SceneError
         If it is missing, no text, or no TOML (with the line).
     """
-    if not path.is_file():
-        raise SceneError(
-            "no such file" if not path.exists() else "is a folder", where=path, remedy="name a scene's TOML file"
-        )
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (UnicodeDecodeError, OSError):
-        raise SceneError("is not a text file", where=path, remedy="give a scene's TOML file in UTF-8") from None
+    text = read_text(path, SceneError, "name a scene's TOML file")
     return text, parse_toml(text, path)
 
 
@@ -139,5 +133,5 @@ def parse_toml(text: str, where: Path) -> TableReader:
     """A reader of the top table of a TOML text."""
     try:
         return TableReader(tomllib.loads(text), where, "")
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: also of numbers too long to read
         raise SceneError(f"is no valid TOML: {error}", where=where, remedy="correct that line") from None

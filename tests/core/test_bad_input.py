@@ -45,6 +45,12 @@ def refused(result: tuple[int, str, str], *words: str) -> None:
         ("nm,a\n400,1\n", ["one wavelength"]),
         ("900,1\n1000,1\n", ["visible"]),
         ("a,b,c\n400,1\n500,1\n", ["header has 3 columns"]),
+        ("400 nm,1\n500,1\n600,1\n", ["line 1", "'400 nm' is not a number"]),
+        ("400,0;1,5\n500,0;1,5\n", ["line 1", "not a number", "decimal points"]),
+        ("4_00,1\n5_00,1\n", ["line 1", "'4_00' is not a number"]),
+        ("٤٠٠,1\n٥٠٠,1\n", ["not a number"]),
+        ("nm," + "x" * 200_000 + "\n400,1\n500,1\n", ["line 1", "field limit"]),
+        ("nm,p\n" + "".join(f"{400 + i / 100:.2f},1\n" for i in range(20_001)), ["20001 wavelengths", "average"]),
     ],
 )
 def test_unusable_lights(run: Run, csv: Csv, text: str, words: list[str]) -> None:
@@ -61,6 +67,23 @@ def test_missing_and_binary_files(run: Run, tmp_path: Path) -> None:
     refused(run("reflectance", tmp_path / "none.csv"), "no such file")
     refused(run("texture", "info", tmp_path / "none.npz"), "no such file")
     refused(run("build", tmp_path / "none.toml", "-o", tmp_path / "x.blend"), "no such file")
+
+
+def test_names_that_no_file_can_have(run: Run, tmp_path: Path) -> None:
+    name = "x" * 5000
+    refused(run("light", name), "no built-in light")
+    for command in (["light", f"{name}.csv"], ["reflectance", name], ["texture", "info", name],
+                    ["light", "D65", "--profile", name], ["build", name, "-o", "x.blend"]):  # fmt: skip
+        refused(run(*command), "no such file")
+
+
+def test_texts_are_read_to_a_limit(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By what is read, not by what the file system says: a device has size 0 and no end."""
+    monkeypatch.setattr("spectral_core.files._LARGEST_TEXT_MB", 1)
+    large = tmp_path / "large.csv"
+    large.write_bytes(b"1" * (1024 * 1024 + 1))
+    for command in (["light", large], ["light", "D65", "--profile", large], ["build", large, "-o", tmp_path / "x"]):
+        refused(run(*command), "larger than 1 MB")
 
 
 def test_descending_tables_are_turned_round(run: Run, csv: Csv) -> None:
