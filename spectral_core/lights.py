@@ -27,6 +27,8 @@ LARGEST_DUV = 0.05
 # Tables coarser than CIE 15 recommends for lamps (5 nm); the sum at its own samples is then a
 # poor integral of the colour-matching functions.
 COARSEST_STEP_NM = 5.0
+# Powers are relative; beyond these their products overflow, or lose their digits.
+_POWER_RANGE = (1e-100, 1e100)
 _INDEX_GRID_NM = np.arange(380.0, 781.0)
 
 
@@ -249,6 +251,9 @@ def _check_powers(name: str, wavelengths: Float64Array, powers: Float64Array) ->
             f"power of '{name}' at {wavelengths[where]:g} nm is negative ({powers[where]:g})",
             remedy="correct it, or set it to 0 if it is the instrument's noise",
         )
+    largest = float(powers.max(initial=0.0))
+    if largest > 0 and not _POWER_RANGE[0] <= largest <= _POWER_RANGE[1]:
+        raise LightError(f"the largest power of '{name}' is {largest:g}", remedy="scale the powers to about 1")
     if not (powers * weights.colour_matching(wavelengths)[:, 1]).sum() > 0:
         raise LightError(f"'{name}' has no luminance", remedy="give a spectrum with power between 380 and 780 nm")
 

@@ -15,6 +15,10 @@ import numpy as np
 from spectral_core.arrays import Float64Array, FloatArray, frozen
 from spectral_core.errors import DisplayError
 
+# No display comes near these; beyond them codes overflow instead of being out of gamut.
+_GAMMA = (0.1, 10.0)
+_LARGEST_XYZ = 100.0
+
 
 class DisplayModel(Protocol):
     """What every display model can do; arrays are (..., 3)."""
@@ -64,7 +68,7 @@ class GammaMatrix:
     Attributes
     ----------
     gamma
-        (3,), above 0.
+        (3,), from 0.1 to 10.
     matrix
         (3, 3), linear device RGB to XYZ, columns the primaries' XYZ at full drive less black.
     black_XYZ
@@ -81,8 +85,10 @@ class GammaMatrix:
             if value.shape != shape or not np.isfinite(value).all():
                 raise DisplayError(f"'{name}' must be {shape} finite numbers", remedy="correct the profile")
             object.__setattr__(self, name, value)
-        if (self.gamma <= 0).any():
-            raise DisplayError("'gamma' must be above 0", remedy="correct the profile")
+        if not ((self.gamma >= _GAMMA[0]) & (self.gamma <= _GAMMA[1])).all():
+            raise DisplayError(f"'gamma' must be from {_GAMMA[0]:g} to {_GAMMA[1]:g}", remedy="correct the profile")
+        if max(np.abs(self.matrix).max(), np.abs(self.black_XYZ).max()) > _LARGEST_XYZ:
+            raise DisplayError("'matrix' or 'black_XYZ' is not relative to white Y = 1", remedy="correct the profile")
         if np.linalg.cond(self.matrix) > 1e8:
             raise DisplayError("'matrix' cannot be inverted: its primaries lie on a line", remedy="correct the profile")
 
