@@ -18,7 +18,7 @@ from spectral_core.display import load_profile
 from spectral_core.errors import LightError, SpectralBoothError
 from spectral_core.imaging import IMAGE_FORMATS
 from spectral_core.lights import Light
-from spectral_core.options import as_json, light_option, observer_option, profile_option
+from spectral_core.options import FiniteRange, as_json, light_option, observer_option, profile_option
 from spectral_core.spectra import colorchecker_spectra, read_spectra, write_spectra
 from spectral_core.textures import open_texture
 
@@ -34,7 +34,7 @@ def cli() -> None:
 
 @cli.command()
 @click.argument("light")
-@click.option("--luminance", type=click.FloatRange(0, min_open=True), default=100.0, show_default=True)
+@click.option("--luminance", type=FiniteRange(0, 1e9, min_open=True), default=100.0, show_default=True)
 @profile_option
 @observer_option
 @as_json

@@ -11,7 +11,7 @@ import click
 from spectral_core.blender_process import run_verb
 from spectral_core.console import Document, emit, facts, progress_bar, rounded, table
 from spectral_core.demo import run_demo
-from spectral_core.options import as_json
+from spectral_core.options import FiniteRange, as_json
 from spectral_core.report.html import ReportInput, SceneRun, find_renders, write_report
 from spectral_core.scene import load_scene
 
@@ -59,7 +59,11 @@ def render(file: Path, light: str | None, level: str | None, stereo: bool, outpu
 @click.option("--images", type=_PATH, help="keep the renders in this folder")
 @click.option("--report", type=_PATH, help="write an HTML report there")
 @click.option(
-    "--limit", type=float, default=_LIMIT, show_default=True, help="largest 8-bit difference allowed at level 2"
+    "--limit",
+    type=FiniteRange(0),
+    default=_LIMIT,
+    show_default=True,
+    help="largest 8-bit difference allowed at level 2",
 )
 @as_json
 def verify(

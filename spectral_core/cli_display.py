@@ -18,9 +18,9 @@ from spectral_core.display.fitting import MODEL_KINDS
 from spectral_core.display.measurements import read_measurements
 from spectral_core.display.profile import in_gamut
 from spectral_core.documents import characterise_document
-from spectral_core.errors import DisplayError, SpectrumError
+from spectral_core.errors import DisplayError
+from spectral_core.files import read_text
 from spectral_core.options import as_json, observer_option, profile_option
-from spectral_core.spectra import read_text
 
 _PATH = click.Path(path_type=Path)
 _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
@@ -95,10 +95,7 @@ def add_display_commands(group: click.Group) -> None:
 def _read(file: Path | None, header: list[str]) -> Float64Array:
     """The three columns (n, 3) under a header."""
     where = file or Path("standard input")
-    try:
-        text = sys.stdin.read() if file is None else read_text(file)
-    except SpectrumError as error:
-        raise DisplayError(error.problem, where=file, remedy=error.remedy) from None
+    text = sys.stdin.read() if file is None else read_text(file, DisplayError, "give a CSV of colours")
     rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text)) if row]
     if not rows or rows[0][:3] != header:
         raise DisplayError(f"does not begin with the header {','.join(header)}", where=where, remedy="add it")

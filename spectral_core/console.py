@@ -23,7 +23,7 @@ def emit(document: Document, as_json: bool, show: Callable[[Console], None]) -> 
     if as_json:
         print(json.dumps(document, allow_nan=False))
     else:
-        show(Console(highlight=False))
+        show(Console(highlight=False, markup=False, emoji=False))  # names are text, whatever is in them
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[Any]], title: str = "") -> Table:

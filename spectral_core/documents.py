@@ -80,7 +80,7 @@ def target_chromaticity(match: str | None, xy: str | None, cct_K: float | None, 
     if xy is not None:
         target = _parse_xy(xy)
         actual, _ = standards.cct_and_duv(target)
-        if cct_K is not None and not abs(actual / cct_K - 1) <= _CCT_AGREEMENT:
+        if cct_K is not None and not abs(actual - cct_K) <= _CCT_AGREEMENT * abs(cct_K):
             raise LightError(f"xy {xy} has a CCT of {actual:.0f} K, not {cct_K:g} K", remedy="give one of the two")
         return target
     if cct_K is not None:

@@ -1,4 +1,4 @@
-"""Writing files so that a killed run leaves either the old file or the new one."""
+"""Reading texts that may be anything, and writing so that a killed run leaves the old file or the new one."""
 
 from __future__ import annotations
 
@@ -8,7 +8,49 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from spectral_core.errors import OutputError
+from spectral_core.errors import OutputError, SpectralBoothError
+
+# A table of spectra, a scene or a profile is far smaller; what is larger is some other file.
+_LARGEST_TEXT_MB = 64
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file system can hold is none."""
+    try:
+        return path.is_file()
+    except OSError:  # too long a name
+        return False
+
+
+def why_no_file(path: Path) -> str:
+    """What is wrong with a path that should have named a file."""
+    try:
+        return "is a folder" if path.is_dir() else "no such file"
+    except OSError as error:
+        return f"no such file ({error.strerror})"
+
+
+def read_text(path: Path, error: type[SpectralBoothError], remedy: str) -> str:
+    """A text file as UTF-8, byte-order mark dropped.
+
+    Raises
+    ------
+    error
+        With one clear line and the remedy, if it is missing, a folder, unreadable, too large or no text.
+    """
+    limit = _LARGEST_TEXT_MB * 1024 * 1024
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(limit + 1)
+    except OSError as problem:
+        what = f"cannot be read ({problem.strerror})" if is_file(path) else why_no_file(path)
+        raise error(what, where=path, remedy=remedy) from None
+    if len(data) > limit:
+        raise error(f"larger than {_LARGEST_TEXT_MB} MB", where=path, remedy=remedy)
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError:
+        raise error("is not a text file in UTF-8", where=path, remedy=remedy) from None
 
 
 @contextmanager
@@ -36,6 +78,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         temporary.replace(target)
     except IsADirectoryError:
         raise OutputError("is a folder", where=target, remedy="name a file") from None
+    except OSError as error:
+        raise OutputError(f"cannot be written ({error.strerror})", where=target, remedy="is the disk full?") from None
     finally:
         temporary.unlink(missing_ok=True)
 

@@ -17,6 +17,7 @@ import numpy as np
 from spectral_core import standards, weights
 from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.errors import LightError, SpectrumError
+from spectral_core.files import is_file
 from spectral_core.spectra import Spectra, read_spectra
 from spectral_core.standards import DEFAULT_OBSERVER
 
@@ -26,6 +27,8 @@ LARGEST_DUV = 0.05
 # Tables coarser than CIE 15 recommends for lamps (5 nm); the sum at its own samples is then a
 # poor integral of the colour-matching functions.
 COARSEST_STEP_NM = 5.0
+# Powers are relative; beyond these their products overflow, or lose their digits.
+_POWER_RANGE = (1e-100, 1e100)
 _INDEX_GRID_NM = np.arange(380.0, 781.0)
 
 
@@ -132,7 +135,7 @@ class Light:
         key = _key(text)
         if key in _ALIASES or key in {_key(each) for each in builtin_names()}:
             return cls.builtin(text)
-        if not looks_like_file and not path.is_file():
+        if not looks_like_file and not is_file(path):
             return cls.builtin(text)
         return light_from_spectra(read_spectra(path, "power"), path)
 
@@ -248,6 +251,9 @@ def _check_powers(name: str, wavelengths: Float64Array, powers: Float64Array) ->
             f"power of '{name}' at {wavelengths[where]:g} nm is negative ({powers[where]:g})",
             remedy="correct it, or set it to 0 if it is the instrument's noise",
         )
+    largest = float(powers.max(initial=0.0))
+    if largest > 0 and not _POWER_RANGE[0] <= largest <= _POWER_RANGE[1]:
+        raise LightError(f"the largest power of '{name}' is {largest:g}", remedy="scale the powers to about 1")
     if not (powers * weights.colour_matching(wavelengths)[:, 1]).sum() > 0:
         raise LightError(f"'{name}' has no luminance", remedy="give a spectrum with power between 380 and 780 nm")
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from spectral_core.chart import chart_objects, patch_surfaces
 from spectral_core.errors import LightError, SceneError, SpectrumError
+from spectral_core.files import is_file
 from spectral_core.lights import Light
 from spectral_core.scene_reader import TableReader, Vector, parse_toml, read_toml
 from spectral_core.shapes import SHAPES
@@ -197,7 +198,7 @@ def _light(reader: TableReader, key: str, name: str, folder: Path) -> str:
 def resolve_light(name: str, folder: Path) -> Light:
     """A light of a scene: built-in, or a file relative to the scene's folder."""
     path = folder / name
-    return Light.load(path) if path.is_file() else Light.load(name)
+    return Light.load(path) if is_file(path) else Light.load(name)
 
 
 def _white(table: TableReader) -> White:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import difflib
 import math
+import reprlib
+import sys
 import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from spectral_core.errors import SceneError
+from spectral_core.files import read_text
 
 _REQUIRED: Any = object()
 Vector = tuple[float, float, float]
@@ -48,7 +51,7 @@ class TableReader:
         value = self.take(key, default)
         if not isinstance(value, str) or (choices and value not in choices):
             allowed = f"one of {', '.join(choices)}" if choices else "a text in quotes"
-            raise self.error(key, f"is {value!r}", f"give {allowed}")
+            raise self.error(key, f"is {_shown(value)}", f"give {allowed}")
         return value
 
     def number(self, key: str, default: Any = _REQUIRED, low: float = -math.inf, high: float = math.inf) -> float:
@@ -59,14 +62,14 @@ class TableReader:
         """A whole number from low to high."""
         value = self.number(key, default, low, high)
         if value != int(value):
-            raise self.error(key, f"is {value!r}", "give a whole number")
+            raise self.error(key, f"is {_shown(value)}", "give a whole number")
         return int(value)
 
     def vector(self, key: str, default: Any = _REQUIRED, low: float = -1e6, high: float = 1e6) -> Vector:
         """Three finite numbers."""
         value = self.take(key, default)
         if not isinstance(value, (list, tuple)) or len(value) != 3:
-            raise self.error(key, f"is {value!r}", "give three numbers in brackets")
+            raise self.error(key, f"is {_shown(value)}", "give three numbers in brackets")
         x, y, z = (self._number(key, each, low, high) for each in value)
         return x, y, z
 
@@ -74,7 +77,7 @@ class TableReader:
         """A list of different strings, at least one."""
         value = self.take(key, default)
         if not isinstance(value, (list, tuple)) or not value or not all(isinstance(each, str) for each in value):
-            raise self.error(key, f"is {value!r}", "give a list of texts in quotes")
+            raise self.error(key, f"is {_shown(value)}", "give a list of texts in quotes")
         if len(set(value)) < len(value):
             raise self.error(key, "names one twice", "give each once")
         return tuple(value)
@@ -105,15 +108,22 @@ class TableReader:
             raise self.error(key, "is no key of this table", hint)
 
     def _number(self, key: str, value: Any, low: float, high: float) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise self.error(key, f"is {value!r}", "give a number")
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= sys.float_info.max:
+            raise self.error(key, f"is {_shown(value)}", "give a number")
         if not low <= value <= high:
             span = f"from {low:g} to {high:g}" if math.isfinite(high) else f"of at least {low:g}"
-            raise self.error(key, f"is {value!r}", f"give a number {span}")
+            raise self.error(key, f"is {_shown(value)}", f"give a number {span}")
         return float(value)
 
     def _path(self, key: str) -> str:
         return f"{self._key}.{key}" if self._key else key
+
+
+def _shown(value: Any) -> str:
+    """A value as a message can hold it: TOML allows lists and integers of any length."""
+    if isinstance(value, int) and abs(value) > sys.float_info.max:
+        return "an enormous number"
+    return reprlib.repr(value)
 
 
 def read_toml(path: Path) -> tuple[str, TableReader]:
@@ -124,14 +134,7 @@ def read_toml(path: Path) -> tuple[str, TableReader]:
     SceneError
         If it is missing, no text, or no TOML (with the line).
     """
-    if not path.is_file():
-        raise SceneError(
-            "no such file" if not path.exists() else "is a folder", where=path, remedy="name a scene's TOML file"
-        )
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (UnicodeDecodeError, OSError):
-        raise SceneError("is not a text file", where=path, remedy="give a scene's TOML file in UTF-8") from None
+    text = read_text(path, SceneError, "name a scene's TOML file")
     return text, parse_toml(text, path)
 
 
@@ -139,5 +142,5 @@ def parse_toml(text: str, where: Path) -> TableReader:
     """A reader of the top table of a TOML text."""
     try:
         return TableReader(tomllib.loads(text), where, "")
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # ValueError: also of numbers too long to read
         raise SceneError(f"is no valid TOML: {error}", where=where, remedy="correct that line") from None

@@ -6,12 +6,13 @@ import csv
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.errors import SpectrumError
+from spectral_core.files import atomic_path, read_text
 
 Quantity = Literal["power", "reflectance"]
 
@@ -20,7 +21,8 @@ _PLAUSIBLE_NM = (100.0, 5000.0)
 _VISIBLE_NM = (360.0, 830.0)
 # Above this a reflectance is a percentage or a raw count; fluorescent samples stay below it.
 _LARGEST_REFLECTANCE = 2.0
-_LARGEST_FILE_BYTES = 256 * 1024 * 1024
+# 0.02 nm over the visible range; finer tables only cost memory.
+_MOST_WAVELENGTHS = 20_000
 
 
 @dataclass(frozen=True)
@@ -65,14 +67,19 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
     path = Path(path)
     rows, lines = _rows(path)
     header, body = _split_header(path, rows)
-    width = len(body[0][1])
+    width = len(_cells(path, *body[0]))
     if width < 2:
         raise SpectrumError(
             "one column only",
-            where=_at(path, body[0][0]),
+            where=_at(path, body[0].number),
             remedy="give wavelengths in nm and at least one spectrum, separated by commas",
         )
-    table = np.array([_numbers(path, line, cells, width) for line, cells in body])
+    if len(body) > _MOST_WAVELENGTHS:
+        raise SpectrumError(
+            f"{len(body)} wavelengths, more than {_MOST_WAVELENGTHS}", where=path, remedy="average neighbouring rows"
+        )
+    # Row by row: lists of all cells would take many times the file's size.
+    table = np.array([np.array(_numbers(path, row, width)) for row in body])
     wavelengths, values = _ascending(path, body, table[:, 0], table[:, 1:].T)
     _check_wavelengths(path, wavelengths, needs_curve=not lines)
     warnings = _check_values(path, wavelengths, values, quantity)
@@ -88,8 +95,6 @@ def write_spectra(
     path: Path, wavelengths_nm: Float64Array, values: Float64Array, names: tuple[str, ...], lines: bool = False
 ) -> None:
     """Write spectra (spectra, n) as CSV that `read_spectra` gives back bit for bit."""
-    from spectral_core.files import atomic_path
-
     with atomic_path(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as stream:
         if lines:
             stream.write("# kind: lines\n")
@@ -99,74 +104,82 @@ def write_spectra(
             writer.writerow([repr(float(wavelength)), *(repr(float(row[index])) for row in values)])
 
 
-def _rows(path: Path) -> tuple[list[tuple[int, list[str]]], bool]:
-    """(line number, cells) of every row that is not blank or a comment, and whether rows are lines."""
-    text = read_text(path)
+class _Row(NamedTuple):
+    """A line of the file with its number, not yet split."""
+
+    number: int
+    text: str
+    delimiter: str
+
+
+def _rows(path: Path) -> tuple[list[_Row], bool]:
+    """Every row that is not blank or a comment, and whether rows are spectral lines."""
+    text = read_text(path, SpectrumError, "give a table of spectra as CSV in UTF-8")
     content = [(number, line.strip()) for number, line in enumerate(text.splitlines(), start=1)]
     lines = any(line.replace(" ", "").casefold() == "#kind:lines" for _, line in content)
     kept = [(number, line.split("#")[0].strip()) for number, line in content if line and not line.startswith("#")]
     if not kept:
         raise SpectrumError("the file holds no data", where=path, remedy="give one row per wavelength: nm, value")
-    first = kept[0][1]
-    delimiter = max(";\t,", key=first.count)
-    return [
-        (number, [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter))]) for number, line in kept
-    ], lines
+    delimiter = max(";\t,", key=kept[0][1].count)
+    return [_Row(number, line, delimiter) for number, line in kept], lines
 
 
-def read_text(path: Path) -> str:
-    """A text file as UTF-8, byte-order mark dropped, with one clear line for what goes wrong."""
-    if not path.exists():
-        raise SpectrumError("no such file", where=path, remedy="check the path")
-    if path.is_dir():
-        raise SpectrumError("is a folder", where=path, remedy="name a file")
-    if path.stat().st_size > _LARGEST_FILE_BYTES:
-        raise SpectrumError(
-            "larger than 256 MB, too large for a table of spectra", where=path, remedy="is it the right file?"
-        )
+def _cells(path: Path, number: int, text: str, delimiter: str) -> list[str]:
     try:
-        return path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError:
-        raise SpectrumError("is not a text file", where=path, remedy="export the table as CSV in UTF-8") from None
-    except OSError as error:
-        raise SpectrumError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
+        return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter))]
+    except csv.Error as error:
+        raise SpectrumError(str(error), where=_at(path, number), remedy="is it a table of spectra?") from None
 
 
-def _split_header(
-    path: Path, rows: list[tuple[int, list[str]]]
-) -> tuple[list[str] | None, list[tuple[int, list[str]]]]:
-    """A first row whose first cell is no number is the header."""
+def _split_header(path: Path, rows: list[_Row]) -> tuple[list[str] | None, list[_Row]]:
+    """A first row whose first cell is no number is the header.
+
+    A cell that begins like one (``380 nm``, ``380,0``) is a mistake in the data, not a name.
+    """
+    header = _cells(path, *rows[0])
+    if header[0][:1].isdigit() or _is_number(header[0]):
+        return None, rows
+    if len(rows) == 1:
+        raise SpectrumError("a header and no data", where=path, remedy="give one row per wavelength: nm, value")
+    return header, rows[1:]
+
+
+def _number(cell: str) -> float:
+    """What is written, and not what else Python would read as a number (``4_00``, other scripts' digits)."""
+    if "_" in cell or not cell.isascii():
+        raise ValueError(cell)
+    return float(cell)
+
+
+def _is_number(cell: str) -> bool:
     try:
-        float(rows[0][1][0])
+        _number(cell)
     except ValueError:
-        if len(rows) == 1:
-            raise SpectrumError(
-                "a header and no data", where=path, remedy="give one row per wavelength: nm, value"
-            ) from None
-        return rows[0][1], rows[1:]
-    return None, rows
+        return False
+    return True
 
 
-def _numbers(path: Path, line: int, cells: list[str], width: int) -> list[float]:
+def _numbers(path: Path, row: _Row, width: int) -> list[float]:
+    cells = _cells(path, *row)
     if len(cells) != width:
         raise SpectrumError(
             f"{len(cells)} columns, the rows before have {width}",
-            where=_at(path, line),
+            where=_at(path, row.number),
             remedy="give every row the same columns",
         )
     numbers = []
     for cell in cells:
         try:
-            value = float(cell)
+            value = _number(cell)
         except ValueError:
             what = "an empty cell" if not cell else f"'{cell[:40]}' is not a number"
             raise SpectrumError(
-                what, where=_at(path, line), remedy="use decimal points and no units in cells"
+                what, where=_at(path, row.number), remedy="use decimal points and no units in cells"
             ) from None
         if not math.isfinite(value):
             raise SpectrumError(
-                f"'{cell}' is not a finite number",
-                where=_at(path, line),
+                f"'{cell[:40]}' is not a finite number",
+                where=_at(path, row.number),
                 remedy="measure, interpolate or drop that row",
             )
         numbers.append(value)
@@ -174,7 +187,7 @@ def _numbers(path: Path, line: int, cells: list[str], width: int) -> list[float]
 
 
 def _ascending(
-    path: Path, body: list[tuple[int, list[str]]], wavelengths: Float64Array, values: Float64Array
+    path: Path, body: list[_Row], wavelengths: Float64Array, values: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
     steps = np.diff(wavelengths)
     if (steps > 0).all():
@@ -185,7 +198,7 @@ def _ascending(
         at = int(np.argmax(steps == 0)) + 1
         raise SpectrumError(
             f"wavelength {wavelengths[at]:g} nm occurs twice",
-            where=_at(path, body[at][0]),
+            where=_at(path, body[at].number),
             remedy="keep one row per wavelength",
         )
     rising = (steps > 0).sum() >= (steps < 0).sum()
@@ -193,7 +206,7 @@ def _ascending(
     repeated = f"; {wavelengths[at]:g} nm occurs twice" if wavelengths[at] in wavelengths[:at] else ""
     raise SpectrumError(
         f"wavelength {wavelengths[at]:g} nm is out of order after {wavelengths[at - 1]:g} nm{repeated}",
-        where=_at(path, body[at][0]),
+        where=_at(path, body[at].number),
         remedy="sort the rows by wavelength",
     )
 

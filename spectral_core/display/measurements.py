@@ -13,8 +13,8 @@ import numpy as np
 from spectral_core import weights
 from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.display.cgats import parse_cgats
-from spectral_core.errors import DisplayError, SpectrumError
-from spectral_core.spectra import read_text
+from spectral_core.errors import DisplayError
+from spectral_core.files import read_text
 from spectral_core.standards import DEFAULT_OBSERVER
 
 _NAMED_CODES = {
@@ -99,10 +99,7 @@ def read_measurements(path: str | Path, observer: str = DEFAULT_OBSERVER) -> Mea
         If the file is none of these, lacks white or a primary, or contradicts itself.
     """
     path = Path(path)
-    try:
-        text = read_text(path)
-    except SpectrumError as error:
-        raise DisplayError(error.problem, where=path, remedy=error.remedy) from None
+    text = read_text(path, DisplayError, "give a .ti3 or CSV of measurements")
     measured = _from_cgats(text, path, observer) if "BEGIN_DATA_FORMAT" in text else _from_csv(text, path)
     _refuse_contradictions(measured, path)
     return measured

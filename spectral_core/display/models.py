@@ -15,6 +15,10 @@ import numpy as np
 from spectral_core.arrays import Float64Array, FloatArray, frozen
 from spectral_core.errors import DisplayError
 
+# No display comes near these; beyond them codes overflow instead of being out of gamut.
+_GAMMA = (0.1, 10.0)
+_LARGEST_XYZ = 100.0
+
 
 class DisplayModel(Protocol):
     """What every display model can do; arrays are (..., 3)."""
@@ -60,6 +64,8 @@ def checked_vector(name: str, values: Float64Array) -> Float64Array:
     vector = frozen(values)
     if vector.shape != (3,) or not np.isfinite(vector).all():
         raise DisplayError(f"'{name}' must be three finite numbers", remedy="correct the profile")
+    if np.abs(vector).max() > _LARGEST_XYZ:
+        raise DisplayError(f"'{name}' is not relative to white Y = 1", remedy="correct the profile")
     return vector
 
 
@@ -68,6 +74,8 @@ def checked_matrix(values: Float64Array) -> Float64Array:
     matrix = frozen(values)
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all():
         raise DisplayError("'matrix' must be 3 x 3 finite numbers", remedy="correct the profile")
+    if np.abs(matrix).max() > _LARGEST_XYZ:
+        raise DisplayError("'matrix' is not relative to white Y = 1", remedy="correct the profile")
     if np.linalg.cond(matrix) > 1e8:
         raise DisplayError("'matrix' cannot be inverted: its primaries lie on a line", remedy="correct the profile")
     return matrix
@@ -82,7 +90,7 @@ class GammaMatrix:
     Attributes
     ----------
     gamma
-        (3,), above 0.
+        (3,), from 0.1 to 10.
     matrix
         (3, 3), linear device RGB to XYZ, columns the primaries' XYZ at full drive less black.
     black_XYZ
@@ -97,8 +105,8 @@ class GammaMatrix:
         object.__setattr__(self, "gamma", checked_vector("gamma", self.gamma))
         object.__setattr__(self, "matrix", checked_matrix(self.matrix))
         object.__setattr__(self, "black_XYZ", checked_vector("black_XYZ", self.black_XYZ))
-        if (self.gamma <= 0).any():
-            raise DisplayError("'gamma' must be above 0", remedy="correct the profile")
+        if not ((self.gamma >= _GAMMA[0]) & (self.gamma <= _GAMMA[1])).all():
+            raise DisplayError(f"'gamma' must be from {_GAMMA[0]:g} to {_GAMMA[1]:g}", remedy="correct the profile")
 
     def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3) of device codes (..., 3)."""

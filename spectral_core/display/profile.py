@@ -14,7 +14,7 @@ from spectral_core.display.corrected import CorrectedLut
 from spectral_core.display.models import DisplayModel, GammaMatrix, SRGBCurve
 from spectral_core.display.tone_models import GainOffsetGamma, LutMatrix
 from spectral_core.errors import DisplayError
-from spectral_core.files import atomic_path
+from spectral_core.files import atomic_path, is_file, read_text, why_no_file
 
 _FORMAT = "spectral-booth display profile"
 _VERSION = 1
@@ -112,7 +112,7 @@ def read_profile(path: Path) -> DisplayProfile:
         made = kind.from_json(model)
     except KeyError as error:
         raise DisplayError(f"the model lacks {error}", where=path, remedy="correct the profile") from None
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise DisplayError(
             "the model holds something that is no number", where=path, remedy="correct the profile"
         ) from None
@@ -122,15 +122,16 @@ def read_profile(path: Path) -> DisplayProfile:
 
 
 def _json(path: Path) -> dict[str, Any]:
-    if not path.is_file():
+    if not is_file(path):
         raise DisplayError(
-            "no such file, and no built-in profile of that name",
+            f"{why_no_file(path)}, and no built-in profile of that name",
             where=path,
             remedy="use sRGB, htc-vive-2021, htc-vive-2020 or a file",
         )
+    text = read_text(path, DisplayError, "give a profile written by this program")
     try:
-        document = json.loads(path.read_text(encoding="utf-8-sig"))
-    except (UnicodeDecodeError, json.JSONDecodeError, RecursionError):
+        document = json.loads(text)
+    except (ValueError, RecursionError):  # ValueError: also of numbers too long to read
         raise DisplayError("is not JSON", where=path, remedy="give a profile written by this program") from None
     if not isinstance(document, dict):
         raise DisplayError("is not a display profile", where=path, remedy="give a profile written by this program")

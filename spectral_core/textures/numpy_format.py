@@ -15,8 +15,8 @@ from typing import IO, Any
 import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array, frozen
-from spectral_core.errors import SpectrumError, TextureError
-from spectral_core.spectra import read_text
+from spectral_core.errors import TextureError
+from spectral_core.files import read_text
 from spectral_core.textures.base import HyperspectralTexture, Kind
 
 # NumPy types these functions in some versions only.
@@ -187,14 +187,13 @@ def _wavelengths_beside(path: Path, bands: int) -> Float64Array:
             where=path,
             remedy=f"write {beside.name} beside it, one wavelength in nm a line, or save .npz",
         )
+    text = read_text(beside, TextureError, "give one wavelength in nm a line")
     try:
-        values = [float(line) for line in read_text(beside).splitlines() if line.strip() and not line.startswith("#")]
+        values = [float(line) for line in text.splitlines() if line.strip() and not line.startswith("#")]
     except ValueError as error:
         raise TextureError(
             f"holds something that is no number ({error})", where=beside, remedy="give one wavelength in nm a line"
         ) from None
-    except SpectrumError as error:
-        raise TextureError(error.problem, where=beside, remedy=error.remedy) from None
     return _checked_wavelengths(np.array(values), bands, beside)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from spectral_core.errors import TextureError
+from spectral_core.files import is_file, why_no_file
 from spectral_core.textures.base import HyperspectralTexture
 from spectral_core.textures.numpy_format import NpyTexture, NpzTexture
 from spectral_core.textures.spectral_exr import SpectralExrTexture
@@ -25,10 +26,8 @@ def open_texture(path: str | Path) -> HyperspectralTexture:
         If the file is missing, of an unknown format, damaged, or not a texture of spectra.
     """
     path = Path(path)
-    if not path.is_file():
-        raise TextureError(
-            "no such file" if not path.exists() else "is a folder", where=path, remedy="name a texture file"
-        )
+    if not is_file(path):
+        raise TextureError(why_no_file(path), where=path, remedy="name a texture file")
     try:
         with path.open("rb") as stream:
             head = stream.read(8)

@@ -45,6 +45,14 @@ def refused(result: tuple[int, str, str], *words: str) -> None:
         ("nm,a\n400,1\n", ["one wavelength"]),
         ("900,1\n1000,1\n", ["visible"]),
         ("a,b,c\n400,1\n500,1\n", ["header has 3 columns"]),
+        ("400 nm,1\n500,1\n600,1\n", ["line 1", "'400 nm' is not a number"]),
+        ("400,0;1,5\n500,0;1,5\n", ["line 1", "not a number", "decimal points"]),
+        ("400,1e308\n500,1e308\n", ["largest power", "1e+308"]),
+        ("400,1e-310\n500,1e-310\n", ["largest power", "scale"]),
+        ("4_00,1\n5_00,1\n", ["line 1", "'4_00' is not a number"]),
+        ("٤٠٠,1\n٥٠٠,1\n", ["not a number"]),
+        ("nm," + "x" * 200_000 + "\n400,1\n500,1\n", ["line 1", "field limit"]),
+        ("nm,p\n" + "".join(f"{400 + i / 100:.2f},1\n" for i in range(20_001)), ["20001 wavelengths", "average"]),
     ],
 )
 def test_unusable_lights(run: Run, csv: Csv, text: str, words: list[str]) -> None:
@@ -61,6 +69,23 @@ def test_missing_and_binary_files(run: Run, tmp_path: Path) -> None:
     refused(run("reflectance", tmp_path / "none.csv"), "no such file")
     refused(run("texture", "info", tmp_path / "none.npz"), "no such file")
     refused(run("build", tmp_path / "none.toml", "-o", tmp_path / "x.blend"), "no such file")
+
+
+def test_names_that_no_file_can_have(run: Run, tmp_path: Path) -> None:
+    name = "x" * 5000
+    refused(run("light", name), "no built-in light")
+    for command in (["light", f"{name}.csv"], ["reflectance", name], ["texture", "info", name],
+                    ["light", "D65", "--profile", name], ["build", name, "-o", "x.blend"]):  # fmt: skip
+        refused(run(*command), "no such file")
+
+
+def test_texts_are_read_to_a_limit(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """By what is read, not by what the file system says: a device has size 0 and no end."""
+    monkeypatch.setattr("spectral_core.files._LARGEST_TEXT_MB", 1)
+    large = tmp_path / "large.csv"
+    large.write_bytes(b"1" * (1024 * 1024 + 1))
+    for command in (["light", large], ["light", "D65", "--profile", large], ["build", large, "-o", tmp_path / "x"]):
+        refused(run(*command), "larger than 1 MB")
 
 
 def test_descending_tables_are_turned_round(run: Run, csv: Csv) -> None:
@@ -97,7 +122,9 @@ def test_unknown_names(run: Run) -> None:
     refused(run("light", "D65", "--observer", "2deg"), "cie1931-2")
     refused(run("light"), "LIGHT")
     refused(run("paint"), "paint")
-    refused(run("light", "D65", "--luminance", "-1"), "luminance")
+    for luminance in ("-1", "0", "nan", "inf", "1e308"):
+        refused(run("light", "D65", "--luminance", luminance), "luminance")
+    refused(run("verify", "none.blend", "--limit", "nan"), "limit", "not a number")
 
 
 def test_impossible_designs(run: Run) -> None:
@@ -107,6 +134,7 @@ def test_impossible_designs(run: Run) -> None:
     refused(run("light-design", "--leds", "6", "--rf", "99.9"), "out of reach")
     refused(run("light-design", "--peak", "456", "--xy", "0.3"), "chromaticity")
     refused(run("light-design", "--peak", "456", "--xy", "0.31,0.33", "--cct", "3000"), "CCT")
+    refused(run("light-design", "--peak", "456", "--xy", "0.31,0.33", "--cct", "0"), "CCT")
     refused(run("light-design", "--peak", "456", "--match", "D65", "--cct", "3000"), "give one")
 
 
@@ -194,6 +222,9 @@ def scene_with(tmp_path: Path, old: str, new: str) -> Path:
         ('name = "sun"', 'name = "white"', ["'white' is used twice"]),
         ("[[lamps]]", "[lamps]", ["lamps", "[[lamps]]"]),
         ('shape = "plane"', 'shape = "teapot"', ["shape", "teapot"]),
+        ("luminance = 0.85", "luminance = 0x" + "f" * 4000, ["white.luminance", "enormous"]),
+        ("luminance = 0.85", "luminance = " + "9" * 5000, ["TOML", "digits"]),
+        ("luminance = 0.85", "luminance = [" + "1, " * 9000 + "]", ["white.luminance", "[1, 1, 1"]),
     ],
 )
 def test_scenes_with_a_wrong_key(run: Run, tmp_path: Path, old: str, new: str, words: list[str]) -> None:

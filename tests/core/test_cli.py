@@ -104,6 +104,15 @@ def test_people_get_a_table(run: Run, command: list[str]) -> None:
     assert max(map(len, out.splitlines())) <= 80
 
 
+def test_names_are_text_and_no_markup(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    path.write_text("nm,[/x] :smile:\n380,1\n780,1\n")
+    for command in ("light", "reflectance"):
+        code, out, _ = run(command, path)
+        assert code == 0
+        assert "[/x] :smile:" in out
+
+
 def test_help_and_version(run: Run) -> None:
     assert "Usage" in run("--help")[1]
     for command in ("light", "bake", "verify", "demo"):

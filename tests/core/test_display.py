@@ -57,10 +57,13 @@ def test_profiles_survive_json(tmp_path: Path) -> None:
     ("change", "message"),
     [
         ({"gamma": [2.2, 2.2]}, "gamma"),
-        ({"gamma": [2.2, 0, 2.2]}, "above 0"),
+        ({"gamma": [2.2, 0, 2.2]}, "from 0.1 to 10"),
         ({"matrix": [[1, 0, 0], [1, 0, 0], [0, 0, 1]]}, "cannot be inverted"),
         ({"black_XYZ": ["dark", 0, 0]}, "no number"),
         ({"black_XYZ": [float("nan"), 0, 0]}, "finite"),
+        ({"black_XYZ": [10**400, 0, 0]}, "no number"),
+        ({"black_XYZ": [0, 1000, 0]}, "relative to white"),
+        ({"gamma": [2.2, 1e-300, 2.2]}, "from 0.1 to 10"),
     ],
 )
 def test_damaged_profiles_are_refused(tmp_path: Path, change: dict[str, object], message: str) -> None:
@@ -74,7 +77,7 @@ def test_damaged_profiles_are_refused(tmp_path: Path, change: dict[str, object],
 
 
 def test_other_files_are_no_profiles(tmp_path: Path) -> None:
-    for text in ("", "[1]", "{}", "{", '{"format": "spectral-booth display profile", "version": 1}'):
+    for text in ("", "[1]", "1" * 5000, "{}", "{", '{"format": "spectral-booth display profile", "version": 1}'):
         path = tmp_path / "p.json"
         path.write_text(text)
         with pytest.raises(DisplayError):

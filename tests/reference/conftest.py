@@ -9,6 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spectral_core import standards
+
+# Before a test imports colour-science itself: a missing scipy must not be a mock to these tests.
+standards.colour_science_version()
+
 MatFile = Callable[[str], Mapping[str, Any]]
 
 
