@@ -80,7 +80,8 @@ def project(texture: HyperspectralTexture, weights: Float64Array) -> Iterator[tu
 def project_tile(texture: HyperspectralTexture, tile: Tile, factors: Float32Array) -> Float32Array:
     """(rows, width, columns) of one tile times factors (bands, columns)."""
     rows, width, bands = tile.values.shape
-    values = (tile.values.reshape(-1, bands) @ factors).reshape(rows, width, -1)
+    with np.errstate(invalid="ignore", over="ignore"):
+        values = (tile.values.reshape(-1, bands) @ factors).reshape(rows, width, -1)
     if not np.isfinite(values).all():
         row = tile.first_row + int(np.argmax(~np.isfinite(values).all(axis=(1, 2))))
         raise TextureError(

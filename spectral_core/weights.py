@@ -21,6 +21,9 @@ from spectral_core.arrays import Float64Array, IntArray, frozen
 from spectral_core.errors import LightError, SpectrumError
 from spectral_core.standards import DEFAULT_OBSERVER, observer_table
 
+# The spline's operator is dense, bands by bands: this many take seconds and half a gigabyte.
+LARGEST_BANDS = 4000
+
 
 @dataclass(frozen=True)
 class WeightingFactors:
@@ -128,7 +131,7 @@ def weighting_factors(
     Raises
     ------
     SpectrumError
-        If bands repeat or are not finite, or the interpolation is unknown.
+        If bands repeat, are not finite or more than `LARGEST_BANDS`, or the interpolation is unknown.
     LightError
         If the light has no luminance.
     """
@@ -185,6 +188,10 @@ def _checked_order(bands: Float64Array) -> IntArray:
     if bands.ndim != 1 or len(bands) == 0 or not np.all(np.isfinite(bands)):
         raise SpectrumError(
             "band wavelengths must be a list of finite numbers", remedy="give one wavelength in nm per band"
+        )
+    if len(bands) > LARGEST_BANDS:
+        raise SpectrumError(
+            f"{len(bands)} bands, more than {LARGEST_BANDS}", remedy="average neighbouring ones: 1 nm is plenty"
         )
     order = np.argsort(bands)
     repeated = bands[order][:-1][np.diff(bands[order]) == 0]

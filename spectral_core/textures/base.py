@@ -5,11 +5,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array
+from spectral_core.errors import TextureError
 
 Kind = Literal["reflectance", "radiance"]
 
@@ -86,3 +88,22 @@ class HyperspectralTexture(ABC):
     def pixel(self, x: int, y: int) -> Float64Array:
         """Spectrum (bands,) at column x (to the right) and row y (down), both from 0."""
         return np.asarray(self.rows(y, 1)[0, x], dtype=np.float64)
+
+
+def checked_wavelengths(wavelengths: Float64Array, bands: int, path: Path) -> Float64Array:
+    """The wavelengths (bands,) of a texture in nm, as they are.
+
+    Raises
+    ------
+    TextureError
+        If they are not one for each band, no nanometres of light, or repeated.
+    """
+    if wavelengths.shape != (bands,):
+        raise TextureError(
+            f"{wavelengths.size} wavelengths for {bands} bands", where=path, remedy="give one wavelength per band"
+        )
+    if not np.isfinite(wavelengths).all() or wavelengths.min() < 100 or wavelengths.max() > 5000:
+        raise TextureError("the wavelengths are not nanometres of light", where=path, remedy="give them in nm")
+    if len(np.unique(wavelengths)) < bands:
+        raise TextureError("a wavelength occurs twice", where=path, remedy="average or drop one of the two bands")
+    return wavelengths

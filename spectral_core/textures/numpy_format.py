@@ -7,22 +7,30 @@ it, one a line, and it is reflectance. Integers are refused: a count is not a re
 
 from __future__ import annotations
 
+import lzma
 import math
 import zipfile
+import zlib
 from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from spectral_core.arrays import Float32Array, Float64Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.files import read_text
-from spectral_core.textures.base import HyperspectralTexture, Kind
+from spectral_core.textures.base import HyperspectralTexture, Kind, checked_wavelengths
+from spectral_core.weights import LARGEST_BANDS
 
 # NumPy types these functions in some versions only.
 _FORMAT: Any = np.lib.format
 _LARGEST_SIDE = 1 << 20
-_LARGEST_BANDS = 10_000
+# What a damaged or hostile archive makes zipfile and its decompressors raise.
+_DAMAGE = (
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, EOFError, OSError, RuntimeError, KeyError, ValueError,
+    OverflowError,
+)  # fmt: skip
 
 
 class NpyTexture(HyperspectralTexture):
@@ -46,7 +54,7 @@ class NpyTexture(HyperspectralTexture):
 
     def rows(self, first: int, count: int) -> Float32Array:
         """`count` rows from `first` on: (count, width, bands), float32."""
-        return np.ascontiguousarray(self._cube[first : first + count], dtype=np.float32)
+        return _as_float32(self._cube[first : first + count])
 
 
 class NpzTexture(HyperspectralTexture):
@@ -72,11 +80,11 @@ class NpzTexture(HyperspectralTexture):
                         remedy="save numpy.ascontiguousarray of it",
                     )
                 wavelengths = _small_array(archive, members, path)
-        except (zipfile.BadZipFile, NotImplementedError, EOFError, OSError, RuntimeError) as error:
+        except _DAMAGE as error:
             raise TextureError(f"is a damaged archive ({error})", where=path, remedy="write it again") from None
         self.name = path.stem
         self.height, self.width, bands = self._shape
-        self.wavelengths_nm = frozen(_checked_wavelengths(wavelengths, bands, path))
+        self.wavelengths_nm = frozen(checked_wavelengths(wavelengths, bands, path))
         self.warnings = ()
 
     def _read_header(
@@ -100,14 +108,14 @@ class NpzTexture(HyperspectralTexture):
                 self._next_row = 0
             self._stream.seek((first - self._next_row) * row_bytes, 1)
             data = self._stream.read(count * row_bytes)
-        except (zipfile.BadZipFile, EOFError, OSError, zipfile.zlib.error) as error:  # type: ignore[attr-defined]
+        except _DAMAGE as error:
             raise TextureError(f"is a damaged archive ({error})", where=self._path, remedy="write it again") from None
         if len(data) < count * row_bytes:
             raise TextureError(
                 f"ends in row {first + len(data) // row_bytes}", where=self._path, remedy="write it again"
             )
         self._next_row = first + count
-        return np.frombuffer(data, dtype=self._dtype).reshape(count, self.width, self.bands).astype(np.float32)
+        return _as_float32(np.frombuffer(data, dtype=self._dtype).reshape(count, self.width, self.bands))
 
     def close(self) -> None:
         """Close the archive; the next read opens it again."""
@@ -116,21 +124,29 @@ class NpzTexture(HyperspectralTexture):
             self._stream = None
 
 
+def _as_float32(values: npt.NDArray[Any]) -> Float32Array:
+    """What float32 cannot hold becomes infinite, which whoever uses the pixels refuses."""
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(values, dtype=np.float32)
+
+
 def _header(stream: IO[bytes], path: Path) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
     """Shape, order and type of an array file, without evaluating or allocating anything of it."""
     try:
         version = _FORMAT.read_magic(stream)
         read = _FORMAT.read_array_header_1_0 if version == (1, 0) else _FORMAT.read_array_header_2_0
         shape, fortran, dtype = read(stream)
-    except (ValueError, EOFError) as error:
+    except Exception as error:  # the header is Python text: its parser raises what Python's does
         raise TextureError(
-            f"has a damaged NumPy header ({str(error).splitlines()[0]})", where=path, remedy="write it again"
+            f"has a damaged NumPy header ({next(iter(str(error).splitlines()), type(error).__name__)})",
+            where=path,
+            remedy="write it again",
         ) from None
     return shape, fortran, dtype
 
 
 def _check_cube(shape: tuple[int, ...], dtype: np.dtype[Any], path: Path) -> None:
-    if len(shape) != 3 or not all(0 < side <= _LARGEST_SIDE for side in shape) or shape[2] > _LARGEST_BANDS:
+    if len(shape) != 3 or not all(0 < side <= _LARGEST_SIDE for side in shape) or shape[2] > LARGEST_BANDS:
         raise TextureError(f"holds an array of shape {shape}", where=path, remedy="give (height, width, bands)")
     if dtype.hasobject or dtype.kind != "f":
         raise TextureError(
@@ -166,17 +182,15 @@ def _small_array(archive: zipfile.ZipFile, members: dict[str, zipfile.ZipInfo], 
     info = members.get("wavelengths_nm")
     if info is None:
         raise TextureError("lacks the array 'wavelengths_nm'", where=path, remedy="save one wavelength in nm per band")
-    if info.file_size > 8 * _LARGEST_BANDS + 4096:
+    if info.file_size > 16 * LARGEST_BANDS + 4096:
         raise TextureError("'wavelengths_nm' is far too large", where=path, remedy="save one wavelength in nm per band")
     with archive.open(info) as stream:
-        try:
-            return np.asarray(_FORMAT.read_array(stream, allow_pickle=False), dtype=np.float64)
-        except (ValueError, TypeError) as error:
-            raise TextureError(
-                f"'wavelengths_nm' cannot be read ({str(error).splitlines()[0]})",
-                where=path,
-                remedy="save plain numbers",
-            ) from None
+        shape, _, dtype = _header(stream, path)
+        if dtype.kind not in "fiu":
+            raise TextureError(f"'wavelengths_nm' is of type {dtype}", where=path, remedy="save plain numbers")
+        _check_size(info.file_size - stream.tell(), shape, dtype, path)
+        data = stream.read(math.prod(shape) * dtype.itemsize)
+    return np.asarray(np.frombuffer(data, dtype=dtype), dtype=np.float64).reshape(shape)
 
 
 def _wavelengths_beside(path: Path, bands: int) -> Float64Array:
@@ -194,16 +208,4 @@ def _wavelengths_beside(path: Path, bands: int) -> Float64Array:
         raise TextureError(
             f"holds something that is no number ({error})", where=beside, remedy="give one wavelength in nm a line"
         ) from None
-    return _checked_wavelengths(np.array(values), bands, beside)
-
-
-def _checked_wavelengths(wavelengths: Float64Array, bands: int, path: Path) -> Float64Array:
-    if wavelengths.shape != (bands,):
-        raise TextureError(
-            f"{wavelengths.size} wavelengths for {bands} bands", where=path, remedy="give one wavelength per band"
-        )
-    if not np.isfinite(wavelengths).all() or wavelengths.min() < 100 or wavelengths.max() > 5000:
-        raise TextureError("the wavelengths are not nanometres of light", where=path, remedy="give them in nm")
-    if len(np.unique(wavelengths)) < bands:
-        raise TextureError("a wavelength occurs twice", where=path, remedy="average or drop one of the two bands")
-    return wavelengths
+    return checked_wavelengths(np.array(values), bands, beside)

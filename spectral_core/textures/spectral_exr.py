@@ -16,7 +16,7 @@ import numpy as np
 from spectral_core.arrays import Float32Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.imaging import oiio
-from spectral_core.textures.base import HyperspectralTexture, Kind
+from spectral_core.textures.base import HyperspectralTexture, Kind, checked_wavelengths
 
 _NUMBER = r"(\d*,?\d*(?:[Ee][+-]?\d+)?)"
 _UNIT = r"(Y|Z|E|P|T|G|M|k|h|da|d|c|m|u|n|p)?(m|Hz)"
@@ -44,10 +44,8 @@ class SpectralExrTexture(HyperspectralTexture):
         _refuse_what_cannot_be_shown(spec.channelnames, path)
         self.kind, channels = _spectral_channels(spec.channelnames, path)
         wavelengths, self._channels = zip(*sorted(channels), strict=True)
-        if len(set(wavelengths)) < len(wavelengths):
-            raise TextureError("a wavelength occurs twice", where=path, remedy="keep one layer of the file")
         # Names have six decimals: what the unit's conversion adds beyond them is noise.
-        self.wavelengths_nm = frozen(np.round(wavelengths, 6))
+        self.wavelengths_nm = frozen(checked_wavelengths(np.round(wavelengths, 6), len(channels), path))
         self.height, self.width = int(spec.height), int(spec.width)
         self._origin_y = int(spec.y)
         self._tile_rows = int(spec.tile_height)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -180,6 +182,41 @@ def test_archives_that_are_no_textures(run: Run, tmp_path: Path) -> None:
     refused(run("texture", "info", path), "is empty")
     path.write_bytes(b"\x76\x2f\x31\x01" + b"\0" * 100)
     refused(run("texture", "info", path), "OpenEXR")
+
+
+def test_archives_that_promise_what_no_memory_holds(run: Run, tmp_path: Path) -> None:
+    """Headers are read before anything is allocated; what the parser of headers raises is caught."""
+    path = tmp_path / "cube.npz"
+    good = io.BytesIO()
+    np.save(good, np.zeros((4, 4, 3), np.float32))
+    for member, word in (
+        (b"{'descr': '<f8', 'fortran_order': False, 'shape': (100000000000,), }", "promises"),
+        (b"{'descr': '|O', 'fortran_order': False, 'shape': (3,), }", "type object"),
+        (b"{'descr': '<f8', 'fortran_order': False, 'shape': (3,", "damaged NumPy header"),
+    ):
+        header = b"\x93NUMPY\x01\x00" + len(member).to_bytes(2, "little") + member + bytes(24)
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("reflectance.npy", good.getvalue())
+            archive.writestr("wavelengths_nm.npy", header)
+        refused(run("texture", "info", path), word)
+
+
+def test_damage_inside_a_compressed_archive(run: Run, tmp_path: Path) -> None:
+    """zlib's own errors, in the header and in the pixels."""
+    path = tmp_path / "cube.npz"
+    cube = np.random.default_rng(1).random((40, 40, 5)).astype(np.float32)
+    np.savez_compressed(path, reflectance=cube, wavelengths_nm=np.linspace(400, 700, 5))
+    whole = path.read_bytes()
+    for at in (48, 60, len(whole) // 2):
+        path.write_bytes(whole[:at] + bytes(each ^ 0xFF for each in whole[at : at + 40]) + whole[at + 40 :])
+        refused(run("texture", "pixel", path, "39", "39"), "damaged")
+
+
+def test_values_beyond_float32_are_told_without_python_warnings(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "cube.npz"
+    np.savez(path, reflectance=np.full((4, 4, 2), 1e300), wavelengths_nm=np.array([400.0, 500.0]))
+    refused(run("texture", "pixel", path, "0", "0"), "no finite number")
+    refused(run("bake", path, "--light", "D65", "-o", tmp_path), "no finite number in row 0")
 
 
 def test_pickles_are_never_loaded(run: Run, tmp_path: Path) -> None:

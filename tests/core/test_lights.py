@@ -89,6 +89,24 @@ def test_led_mixtures_meet_chromaticity_and_fidelity(rf: float) -> None:
     assert light.quality().rf == pytest.approx(rf, abs=1e-6)
 
 
+def test_many_leds_take_seconds() -> None:
+    """The search works on a spread of the mixtures of three: all 110 of twelve LEDs took minutes."""
+    target = np.array([0.33, 0.34])
+    evaluations = 0
+    score = light_design._rf
+
+    def counted(mixture: np.ndarray, leds: np.ndarray) -> float:
+        nonlocal evaluations
+        evaluations += 1
+        return score(mixture, leds)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(light_design, "_rf", counted)
+        light = light_design.led_mixture(target, 90.0, 12)
+    assert light.quality().rf == pytest.approx(90, abs=1e-6)
+    assert evaluations < 1500
+
+
 def test_an_impossible_mixture_names_what_is_possible() -> None:
     with pytest.raises(LightError, match="ask for"):
         light_design.led_mixture(np.array([0.31, 0.33]), 99.9, 3)

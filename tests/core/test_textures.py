@@ -133,6 +133,9 @@ def test_a_failed_bake_leaves_what_was_there(tmp_path: Path, cube: np.ndarray) -
         (["S0.400,0nm", "S1.400,0nm", "S2.400,0nm"], "polarised"),
         (["T.400,0nm", "T.400,0nm.500,0nm", "T.500,0nm"], "bispectral"),
         (["T.0,0nm", "T.500,0nm", "T.600,0nm"], "no wavelength"),
+        (["T.1E400nm", "T.500,0nm", "T.600,0nm"], "not nanometres"),
+        (["T.50,0nm", "T.500,0nm", "T.600,0nm"], "not nanometres"),
+        (["T.500,0nm", "T.500,00000001nm", "T.600,0nm"], "twice"),
     ],
 )
 def test_exr_files_that_cannot_be_shown(tmp_path: Path, names: list[str], message: str) -> None:

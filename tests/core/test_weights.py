@@ -115,7 +115,7 @@ def test_quadrature_of_an_even_table_is_its_step() -> None:
     np.testing.assert_array_equal(quadrature_widths(np.array([400.0, 410.0, 440.0])), [10.0, 20.0, 30.0])
 
 
-@pytest.mark.parametrize("bands", [[400.0, 400.0], [np.nan, 500.0], []])
+@pytest.mark.parametrize("bands", [[400.0, 400.0], [np.nan, 500.0], [], np.linspace(380, 780, 4001).tolist()])
 def test_impossible_bands_are_refused(bands: list[float]) -> None:
     with pytest.raises(SpectrumError):
         Light.builtin("D65").weighting_factors(np.array(bands))
