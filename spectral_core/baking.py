@@ -27,6 +27,9 @@ from spectral_core.memory import anonymous_MB
 from spectral_core.standards import DEFAULT_OBSERVER
 from spectral_core.textures import HyperspectralTexture, Tile
 
+# Beyond it EXR images of half floats would hold infinity.
+_LARGEST_HALF = 65504.0
+
 Progress = Callable[[float, str], None]
 
 
@@ -139,7 +142,7 @@ def bake(
             for tile in _timed(texture.tiles(), seconds):
                 mark = time.perf_counter()
                 XYZ = project_tile(texture, tile, factors)
-                linear = np.asarray(profile.to_linear(XYZ.reshape(*XYZ.shape[:2], -1, 3)), dtype=np.float32)
+                linear = _linear(texture, tile, XYZ, profile)
                 seconds["project"] += time.perf_counter() - mark
                 mark = time.perf_counter()
                 for number, (level, index) in enumerate(jobs):
@@ -165,6 +168,18 @@ def bake(
         for (level, index), path, count in zip(jobs, paths, clipped, strict=True)
     )
     return BakeResult(images, seconds, pixels_total, texture.bands, max(memory) or None)
+
+
+def _linear(texture: HyperspectralTexture, tile: Tile, XYZ: Float32Array, profile: DisplayProfile) -> Float32Array:
+    """Linear RGB (rows, width, lights, 3) of XYZ (rows, width, 3 * lights), within what half floats hold."""
+    linear = profile.to_linear(XYZ.reshape(*XYZ.shape[:2], -1, 3))
+    largest = max(float(linear.max()), -float(linear.min()))
+    if largest > _LARGEST_HALF:
+        raise TextureError(
+            f"'{texture.name}' has values up to {largest:.3g} times white in the rows from {tile.first_row}",
+            remedy="divide counts by the white reference",
+        )
+    return np.asarray(linear, dtype=np.float32)
 
 
 def _timed(tiles: Iterator[Tile], seconds: dict[str, float]) -> Iterator[Tile]:

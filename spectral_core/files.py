@@ -42,8 +42,8 @@ def read_text(path: Path, error: type[SpectralBoothError], remedy: str) -> str:
     try:
         with path.open("rb") as stream:
             data = stream.read(limit + 1)
-    except OSError as problem:
-        what = f"cannot be read ({problem.strerror})" if is_file(path) else why_no_file(path)
+    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
+        what = f"cannot be read ({problem})" if is_file(path) else why_no_file(path)
         raise error(what, where=path, remedy=remedy) from None
     if len(data) > limit:
         raise error(f"larger than {_LARGEST_TEXT_MB} MB", where=path, remedy=remedy)

@@ -81,7 +81,7 @@ class NpzTexture(HyperspectralTexture):
                     )
                 wavelengths = _small_array(archive, members, path)
         except _DAMAGE as error:
-            raise TextureError(f"is a damaged archive ({error})", where=path, remedy="write it again") from None
+            raise _damaged(error, path) from None
         self.name = path.stem
         self.height, self.width, bands = self._shape
         self.wavelengths_nm = frozen(checked_wavelengths(wavelengths, bands, path))
@@ -109,7 +109,7 @@ class NpzTexture(HyperspectralTexture):
             self._stream.seek((first - self._next_row) * row_bytes, 1)
             data = self._stream.read(count * row_bytes)
         except _DAMAGE as error:
-            raise TextureError(f"is a damaged archive ({error})", where=self._path, remedy="write it again") from None
+            raise _damaged(error, self._path) from None
         if len(data) < count * row_bytes:
             raise TextureError(
                 f"ends in row {first + len(data) // row_bytes}", where=self._path, remedy="write it again"
@@ -122,6 +122,11 @@ class NpzTexture(HyperspectralTexture):
         if self._stream is not None:
             self._stream.close()
             self._stream = None
+
+
+def _damaged(error: Exception, path: Path) -> TextureError:
+    """Messages of zipfile may quote names of the archive, of any length."""
+    return TextureError(f"is a damaged archive ({str(error)[:120]})", where=path, remedy="write it again")
 
 
 def _as_float32(values: npt.NDArray[Any]) -> Float32Array:

@@ -41,8 +41,12 @@ class SpectralExrTexture(HyperspectralTexture):
         if self._input is None:
             raise TextureError(f"is not an OpenEXR image ({_last_error()})", where=path, remedy="write it again")
         spec = self._input.spec()
-        _refuse_what_cannot_be_shown(spec.channelnames, path)
-        self.kind, channels = _spectral_channels(spec.channelnames, path)
+        try:
+            names = spec.channelnames
+        except UnicodeDecodeError:
+            raise TextureError("has damaged channel names", where=path, remedy="write it again") from None
+        _refuse_what_cannot_be_shown(names, path)
+        self.kind, channels = _spectral_channels(names, path)
         wavelengths, self._channels = zip(*sorted(channels), strict=True)
         # Names have six decimals: what the unit's conversion adds beyond them is noise.
         self.wavelengths_nm = frozen(checked_wavelengths(np.round(wavelengths, 6), len(channels), path))

@@ -219,6 +219,16 @@ def test_values_beyond_float32_are_told_without_python_warnings(run: Run, tmp_pa
     refused(run("bake", path, "--light", "D65", "-o", tmp_path), "no finite number in row 0")
 
 
+def test_counts_taken_for_reflectance(run: Run, tmp_path: Path) -> None:
+    """Half floats end at 65504: infinities in an image help nobody."""
+    path = tmp_path / "counts.npz"
+    cube = np.full((4, 4, 2), 0.5, np.float32)
+    cube[2, 1] = 3e38
+    np.savez(path, reflectance=cube, wavelengths_nm=np.array([400.0, 500.0]))
+    refused(run("bake", path, "--light", "D65", "-o", tmp_path), "times white", "white reference")
+    assert not list(tmp_path.glob("*.exr"))
+
+
 def test_pickles_are_never_loaded(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "cube.npz"
     np.savez(path, reflectance=np.array([[["x", None]]], dtype=object), wavelengths_nm=np.array([400.0, 500.0]))
