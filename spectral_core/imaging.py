@@ -48,6 +48,14 @@ def _bundled_with_blender() -> Path | None:
     return folder if (folder / "OpenImageIO").exists() else None
 
 
+def error_text(source: Any) -> str:
+    """The first line of the pending error of OpenImageIO or one of its inputs and outputs."""
+    try:
+        return next(iter(str(source.geterror()).splitlines()), "unknown")
+    except UnicodeDecodeError:  # it quotes the damaged file
+        return "unknown"
+
+
 class ImageWriter:
     """Writes an RGB image from the top down, a few rows at a time."""
 
@@ -75,8 +83,7 @@ class ImageWriter:
             raise OutputError(f"cannot be written ({self._error()})", where=self._path, remedy="is the disk full?")
 
     def _error(self) -> str:
-        text = self._output.geterror() if self._output is not None else oiio().geterror()
-        return (text or "unknown").splitlines()[0]
+        return error_text(self._output if self._output is not None else oiio())
 
 
 def write_png(path: Path, linear: Float32Array) -> None:

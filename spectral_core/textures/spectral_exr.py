@@ -15,7 +15,7 @@ import numpy as np
 
 from spectral_core.arrays import Float32Array, frozen
 from spectral_core.errors import TextureError
-from spectral_core.imaging import oiio
+from spectral_core.imaging import error_text, oiio
 from spectral_core.textures.base import HyperspectralTexture, Kind, checked_wavelengths
 
 _NUMBER = r"(\d*,?\d*(?:[Ee][+-]?\d+)?)"
@@ -39,7 +39,7 @@ class SpectralExrTexture(HyperspectralTexture):
         self._path = path
         self._input = oiio().ImageInput.open(str(path))
         if self._input is None:
-            raise TextureError(f"is not an OpenEXR image ({_last_error()})", where=path, remedy="write it again")
+            raise TextureError(f"is not an OpenEXR image ({error_text(oiio())})", where=path, remedy="write it again")
         spec = self._input.spec()
         try:
             names = spec.channelnames
@@ -72,7 +72,7 @@ class SpectralExrTexture(HyperspectralTexture):
             pixels = self._input.read_scanlines(0, 0, top, top + count, 0, low, high, "float")
         if pixels is None:
             raise TextureError(
-                f"row {first} cannot be read ({self._input.geterror()})",
+                f"row {first} cannot be read ({error_text(self._input)})",
                 where=self._path,
                 remedy="the file is damaged; write it again",
             )
@@ -90,10 +90,6 @@ class SpectralExrTexture(HyperspectralTexture):
         if pixels is None:
             return None
         return np.asarray(pixels).reshape(end - begin, self.width, high - low)[first - begin : first - begin + count]
-
-
-def _last_error() -> str:
-    return (oiio().geterror() or "unknown").splitlines()[0]
 
 
 def _refuse_what_cannot_be_shown(names: tuple[str, ...], path: Path) -> None:
