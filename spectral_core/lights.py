@@ -168,8 +168,10 @@ class Light:
         its ends, each line shared between its two neighbours by distance.
         """
         nm = self.wavelengths_nm
-        if not self.lines.any() and _is_standard_grid(nm):
-            return nm, self.powers
+        inside = (nm >= _INDEX_GRID_NM[0]) & (nm <= _INDEX_GRID_NM[-1])
+        if not self.lines.any() and _is_standard_grid(nm[inside]):
+            # Beyond 380 to 780 nm the table may be uneven: its density, not what its samples stand for.
+            return nm[inside], (self.powers / weights.quadrature_widths(nm))[inside]
         table = ~self.lines
         powers = np.zeros_like(_INDEX_GRID_NM)
         if table.sum() > 1:
@@ -231,8 +233,7 @@ _ALIASES = {
 
 
 def _is_standard_grid(nm: Float64Array) -> bool:
-    inside = nm[(nm >= _INDEX_GRID_NM[0]) & (nm <= _INDEX_GRID_NM[-1])]
-    return any(np.array_equal(inside, np.arange(_INDEX_GRID_NM[0], _INDEX_GRID_NM[-1] + 1, step)) for step in (1, 5))
+    return any(np.array_equal(nm, np.arange(_INDEX_GRID_NM[0], _INDEX_GRID_NM[-1] + 1, step)) for step in (1, 5))
 
 
 def _key(name: str) -> str:

@@ -150,6 +150,16 @@ def test_a_line_in_a_fine_table_agrees_with_an_exact_line() -> None:
     assert table.quality() == exact.quality()
 
 
+def test_indices_see_the_table_and_not_its_uneven_ends() -> None:
+    """Dark samples far outside leave Rf and Ra alone, although the first visible one now stands for more."""
+    grid = np.arange(380.0, 781.0, 5)
+    powers = 1 + 0.3 * np.sin(grid / 20)
+    plain = Light.from_table("plain", grid, powers).quality()
+    longer = Light.from_table("longer", np.r_[300, 310, grid, 800], np.r_[0, 0, powers, 0]).quality()
+    assert longer.rf == pytest.approx(plain.rf, abs=1e-9)
+    assert longer.ra == pytest.approx(plain.ra, abs=1e-9)
+
+
 def test_missing_ends_and_coarse_tables_are_told() -> None:
     short = Light.from_table("short", np.arange(420.0, 641.0, 5), np.ones(45))
     assert any("missing" in each for each in short.warnings)
