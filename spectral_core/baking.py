@@ -137,7 +137,8 @@ def bake(
     clipped = np.zeros(len(jobs), dtype=np.int64)
     with ExitStack() as stack:
         temporaries = [stack.enter_context(atomic_path(path)) for path in paths]
-        writers = [ImageWriter(temporary, texture.width, texture.height, image_format) for temporary in temporaries]
+        size, is_srgb = (texture.width, texture.height), profile is srgb()
+        writers = [ImageWriter(temporary, *size, image_format, is_srgb) for temporary in temporaries]
         try:
             for tile in _timed(texture.tiles(), seconds):
                 mark = time.perf_counter()

@@ -57,13 +57,17 @@ def error_text(source: Any) -> str:
 
 
 class ImageWriter:
-    """Writes an RGB image from the top down, a few rows at a time."""
+    """Writes an RGB image from the top down, a few rows at a time.
 
-    def __init__(self, path: Path, width: int, height: int, image_format: ImageFormat) -> None:
+    Only sRGB images say their colour space: other programs would decode a headset's codes otherwise.
+    """
+
+    def __init__(self, path: Path, width: int, height: int, image_format: ImageFormat, is_srgb: bool = True) -> None:
         self._path = path
         _, pixel_type = IMAGE_FORMATS[image_format]
         spec = oiio().ImageSpec(width, height, 3, pixel_type)
-        spec.attribute("oiio:ColorSpace", "Linear" if image_format == "exr" else "sRGB")
+        if is_srgb:
+            spec.attribute("oiio:ColorSpace", "Linear" if image_format == "exr" else "sRGB")
         spec.attribute("compression", "zip")
         self._row = 0
         self._output: Any = oiio().ImageOutput.create(str(path))

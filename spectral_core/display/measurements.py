@@ -231,8 +231,8 @@ def _refuse_contradictions(measured: Measurements, path: Path) -> None:
                 where=path,
                 remedy="measure white and the three primaries at full drive",
             )
-        if not XYZ[1] > 0:
-            raise DisplayError(f"full {name} has no luminance", where=path, remedy="measure it again")
+        if not XYZ[1] > 0 or (name == "white" and not (XYZ > 0).all()):
+            raise DisplayError(f"full {name} reads {XYZ.tolist()}, not above 0", where=path, remedy="measure it again")
         if name != "white" and XYZ[1] > measured.white_XYZ[1]:
             raise DisplayError(
                 f"{name} ({XYZ[1]:.4g}) is brighter than white ({measured.white_XYZ[1]:.4g}): "
