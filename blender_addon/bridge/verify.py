@@ -186,10 +186,12 @@ def left_out(scene: bpy.types.Scene) -> list[str]:
 def _illumination(
     scene: bpy.types.Scene, description: SceneDescription, identity: measure.Identity
 ) -> measure.Illumination:
-    """By theory where one sun lights flat surfaces; otherwise from an all-white render."""
-    items = [item for item in state.managed_objects(scene) if identity.masks[item.name].sum() >= _FEWEST_PIXELS]
-    flat = all(len(item.data.polygons) == 1 for item in items if _is_patch(item)) and any(map(_is_patch, items))
-    if not (description.single_sun and flat):
+    """By theory where one sun lights flat, dull surfaces; otherwise from an all-white render."""
+    surfaces = scene_surfaces(description)
+    seen = [item for item in state.managed_objects(scene) if identity.masks[item.name].sum() >= _FEWEST_PIXELS]
+    items = [item for item in seen if _is_patch(item) or not surfaces[state.surface_name(item)].uniform]
+    known = all(len(item.data.polygons) == 1 and not surfaces[state.surface_name(item)].gloss for item in items)
+    if not (description.single_sun and any(map(_is_patch, items)) and known):
         return measure.illumination(scene)
     sun = next(state.managed_lamps(scene))
     towards = sun.matrix_world.to_3x3().col[2].normalized()
