@@ -11,14 +11,14 @@ import click
 
 from spectral_core import documents
 from spectral_core.baking import bake
-from spectral_core.cli_blender import add_blender_commands
-from spectral_core.cli_display import add_display_commands
-from spectral_core.console import cell, emit, facts, progress_bar, rounded, table
+from spectral_core.cli.blender import add_blender_commands
+from spectral_core.cli.console import cell, emit, facts, progress_bar, rounded, table
+from spectral_core.cli.display import add_display_commands
+from spectral_core.cli.options import FiniteRange, as_json, light_option, observer_option, profile_option
 from spectral_core.display import load_profile
 from spectral_core.errors import LightError, SpectralBoothError
 from spectral_core.imaging import IMAGE_FORMATS
 from spectral_core.lights import Light
-from spectral_core.options import FiniteRange, as_json, light_option, observer_option, profile_option
 from spectral_core.spectra import colorchecker_spectra, read_spectra, write_spectra
 from spectral_core.textures import open_texture
 
@@ -197,6 +197,3 @@ def _refuse(message: str) -> int:
     print(f"error: {' '.join(message.split())}", file=sys.stderr)
     return 2
 
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -9,9 +9,9 @@ from pathlib import Path
 import click
 
 from spectral_core.blender_process import run_verb
-from spectral_core.console import Document, emit, facts, progress_bar, rounded, table
+from spectral_core.cli.console import Document, emit, facts, progress_bar, rounded, table
+from spectral_core.cli.options import FiniteRange, as_json
 from spectral_core.demo import run_demo
-from spectral_core.options import FiniteRange, as_json
 from spectral_core.report.html import ReportInput, SceneRun, find_renders, write_report
 from spectral_core.scene import load_scene
 

@@ -11,7 +11,8 @@ import click
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.console import emit, rounded, table
+from spectral_core.cli.console import emit, rounded, table
+from spectral_core.cli.options import as_json, observer_option, profile_option
 from spectral_core.display import DisplayProfile, load_profile, write_profile
 from spectral_core.display.characterise import characterise as choose
 from spectral_core.display.fitting import MODEL_KINDS
@@ -20,7 +21,6 @@ from spectral_core.display.profile import in_gamut
 from spectral_core.documents import characterise_document
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
-from spectral_core.options import as_json, observer_option, profile_option
 
 _PATH = click.Path(path_type=Path)
 _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
