@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
-from spectral_core.arrays import Float64Array, FloatArray, frozen
+from spectral_core.arrays import Float64Array, FloatArray, IntArray, frozen
 from spectral_core.errors import DisplayError
 
 # Between neighbouring nodes the curve is a line: with 1025 nodes its error on a gamma of 2.4 is
@@ -15,6 +16,8 @@ NODES = 1025
 # Interpolation runs on values to this power, where display curves are nearly straight.
 _COMPRESSION = 1 / 2.4
 _SMALLEST_STEP = 1e-9
+# Places of the table that an inverse starts from: finer than the nodes where a display's curve is steepest.
+_GUESSES = 8192
 _LENGTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
 # A power law and its residual need a few samples to be judged.
 _FEWEST_SMOOTHED = 6
@@ -41,28 +44,61 @@ class ToneCurve:
 
     def forward(self, codes: FloatArray) -> Float64Array:
         """Linear drive of codes, any shape."""
-        n = len(self.values) - 1
-        scaled = np.abs(codes) * n
-        index = np.minimum(scaled.astype(np.intp), n - 1)
-        low = self.values[index]
-        return np.asarray(np.copysign(low + (scaled - index) * np.diff(self.values)[index], codes))
-
-    def slope(self, codes: FloatArray) -> Float64Array:
-        """Derivative of the drive by code, any shape."""
-        n = len(self.values) - 1
-        index = np.minimum((np.abs(codes) * n).astype(np.intp), n - 1)
-        return np.asarray(np.diff(self.values)[index] * n)
+        at = np.abs(codes) * self._segments
+        segment = np.fmin(at, self._segments - 1).astype(np.intp)
+        drive = np.take(self._steps, segment, mode="clip")
+        drive *= at
+        drive += np.take(self._starts, segment, mode="clip")
+        return np.asarray(np.copysign(drive, codes))
 
     def inverse(self, drive: FloatArray) -> Float64Array:
         """Codes of linear drive, any shape."""
-        values = self.values
-        magnitude = np.abs(drive)
-        codes = np.interp(magnitude, values, np.linspace(0.0, 1.0, len(values)))
-        beyond = magnitude > values[-1]
-        if beyond.any():
-            slope = (values[-1] - values[-2]) * (len(values) - 1)
-            codes = np.where(beyond, 1 + (magnitude - values[-1]) / slope, codes)
+        magnitude: Float64Array = np.abs(np.asarray(drive, dtype=np.float64))
+        segment = self._segment(magnitude)
+        codes = magnitude - np.take(self.values, segment, mode="clip")
+        codes /= np.take(self._steps, segment, mode="clip")
+        codes += segment
+        codes /= self._segments
         return np.asarray(np.copysign(codes, drive))
+
+    def _segment(self, magnitude: Float64Array) -> IntArray:
+        """Where drives lie: read from a table over their square root, then moved up if beyond its end.
+
+        Reading takes a tenth of the time of a binary search.
+        """
+        guesses, scale, moves = self._guesses
+        place = np.fmin(np.sqrt(magnitude) * scale, len(guesses) - 1).astype(np.intp)
+        segment = np.take(guesses, place, mode="clip")
+        for _ in range(moves):
+            segment += magnitude >= np.take(self._ends, segment, mode="clip")
+        return np.asarray(segment)
+
+    @property
+    def _segments(self) -> int:
+        return len(self.values) - 1
+
+    @cached_property
+    def _steps(self) -> Float64Array:
+        return np.diff(self.values)
+
+    @cached_property
+    def _starts(self) -> Float64Array:
+        """What each segment's line has at code 0."""
+        return np.asarray(self.values[:-1] - np.arange(self._segments) * self._steps)
+
+    @cached_property
+    def _ends(self) -> Float64Array:
+        """Where each segment ends; the last goes on."""
+        return np.append(self.values[1:-1], np.inf)
+
+    @cached_property
+    def _guesses(self) -> tuple[IntArray, float, int]:
+        """The segment at each of many square roots of drive, their scale, and the most ends between two."""
+        scale = _GUESSES / float(np.sqrt(self.values[-1]))
+        edges = (np.arange(_GUESSES + 1) / scale) ** 2
+        # A place is rounded: the first segment that it can mean, and the last.
+        first, last = (np.searchsorted(self._ends, edges * (1 + sign * 1e-12), side="right") for sign in (-1, 1))
+        return first.astype(np.intp), scale, int((last[1:] - first[:-1]).max())
 
 
 def fit_curve(codes: Float64Array, drive: Float64Array) -> ToneCurve:

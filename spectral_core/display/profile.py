@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -84,7 +85,7 @@ def write_profile(profile: DisplayProfile, path: Path) -> None:
         "model": {"type": kind, **model.to_json()},
     }
     with atomic_path(path) as temporary:
-        temporary.write_text(json.dumps(document, indent=2) + "\n", encoding="utf-8")
+        temporary.write_text(_json_text(document), encoding="utf-8")
 
 
 def read_profile(path: Path) -> DisplayProfile:
@@ -119,6 +120,12 @@ def read_profile(path: Path) -> DisplayProfile:
     except DisplayError as error:
         raise DisplayError(error.problem, where=path, remedy=error.remedy) from None
     return DisplayProfile(str(document.get("name", path.stem)), made, str(document.get("source", "")), float(white_Y))
+
+
+def _json_text(document: dict[str, Any]) -> str:
+    """JSON with one line per list of numbers: a table of 17 x 17 x 17 colours stays legible."""
+    text = json.dumps(document, indent=2)
+    return re.sub(r"\[([^\[\]{}]*)\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
 
 
 def _json(path: Path) -> dict[str, Any]:

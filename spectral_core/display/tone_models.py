@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spectral_core.arrays import Float64Array, FloatArray
+from spectral_core.arrays import Float64Array, FloatArray, in_blocks
 from spectral_core.display.curves import ToneCurve
 from spectral_core.display.models import checked_matrix, checked_vector, signed_power
 from spectral_core.errors import DisplayError
@@ -39,12 +39,11 @@ class LutMatrix:
 
     def decode(self, codes: FloatArray) -> Float64Array:
         """Linear drive (..., 3) of codes (..., 3)."""
-        codes = np.asarray(codes)
-        return np.stack([curve.forward(codes[..., index]) for index, curve in enumerate(self.curves)], axis=-1)
+        return in_blocks(self._decode, codes)
 
     def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3) of device codes (..., 3)."""
-        return np.asarray(self.decode(codes) @ self.matrix.T + self.black_XYZ)
+        return in_blocks(lambda part: self.matrix @ self._decode(part) + self.black_XYZ[:, None], codes)
 
     def linear(self, XYZ: FloatArray) -> Float64Array:
         """Linear drive (..., 3) of XYZ (..., 3), not clipped."""
@@ -52,12 +51,18 @@ class LutMatrix:
 
     def encode(self, linear: FloatArray) -> Float64Array:
         """Device codes (..., 3) of linear drive (..., 3), not clipped."""
-        linear = np.asarray(linear)
-        return np.stack([curve.inverse(linear[..., index]) for index, curve in enumerate(self.curves)], axis=-1)
+        return in_blocks(self._encode, linear)
 
     def inverse(self, XYZ: FloatArray) -> Float64Array:
         """Device codes (..., 3) of XYZ (..., 3), not clipped."""
-        return self.encode(self.linear(XYZ))
+        matrix = np.linalg.inv(self.matrix)
+        return in_blocks(lambda part: self._encode(matrix @ (part - self.black_XYZ[:, None])), XYZ)
+
+    def _decode(self, codes: Float64Array) -> Float64Array:
+        return np.stack([curve.forward(values) for curve, values in zip(self.curves, codes, strict=True)])
+
+    def _encode(self, linear: Float64Array) -> Float64Array:
+        return np.stack([curve.inverse(values) for curve, values in zip(self.curves, linear, strict=True)])
 
     def to_json(self) -> dict[str, object]:
         """Plain numbers."""
@@ -70,13 +75,16 @@ class LutMatrix:
     @classmethod
     def from_json(cls, document: dict[str, object]) -> LutMatrix:
         """From `to_json`."""
-        curves = document["curves"]
-        if not isinstance(curves, list) or len(curves) != 3:
-            raise DisplayError("'curves' must be three lists", remedy="correct the profile")
-        red, green, blue = (ToneCurve(np.asarray(each, dtype=np.float64)) for each in curves)
-        return cls(
-            (red, green, blue), *(np.asarray(document[name], dtype=np.float64) for name in ("matrix", "black_XYZ"))
-        )
+        matrix, black = (np.asarray(document[name], dtype=np.float64) for name in ("matrix", "black_XYZ"))
+        return cls(curves_from_json(document["curves"]), matrix, black)
+
+
+def curves_from_json(curves: object) -> tuple[ToneCurve, ToneCurve, ToneCurve]:
+    """Three tone curves."""
+    if not isinstance(curves, list) or len(curves) != 3:
+        raise DisplayError("'curves' must be three lists", remedy="correct the profile")
+    red, green, blue = (ToneCurve(np.asarray(each, dtype=np.float64)) for each in curves)
+    return red, green, blue
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,15 @@ rgb = st.lists(st.floats(-2, 2), min_size=3, max_size=3)
 @pytest.mark.parametrize("name", builtin_profile_names())
 @given(codes=rgb)
 def test_inverse_undoes_forward_for_all_codes(name: str, codes: list[float]) -> None:
-    """Outside 0..1 too: nothing is clipped. Near black the power amplifies rounding: compare in XYZ."""
+    """Outside 0..1 too: nothing is clipped. Near black the power amplifies rounding: compare in XYZ.
+
+    The rounded constants of IEC 61966-2-1 leave a step of 3e-9 between sRGB's line and curve.
+    """
     profile = load_profile(name)
     XYZ = profile.to_XYZ(np.array(codes))
     back = profile.to_codes(XYZ)
     assert np.isfinite(back).all()
-    np.testing.assert_allclose(profile.to_XYZ(back), XYZ, atol=1e-12)
+    np.testing.assert_allclose(profile.to_XYZ(back), XYZ, atol=1e-8 if name == "sRGB" else 1e-12)
 
 
 def test_htc_vive_2021_is_algorithm_1() -> None:
