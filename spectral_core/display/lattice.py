@@ -18,7 +18,7 @@ from spectral_core.arrays import Float64Array, FloatArray, IntArray, frozen, in_
 from spectral_core.errors import DisplayError
 
 # Cells to look up the inverse's first tetrahedron in: fine enough that most need no step.
-_GUESSES = 64
+_GUESSES = 48
 # A walk visits a neighbour or two; these many steps end one that does not settle, far out of gamut.
 _STEPS = 40
 # A tetrahedron whose volume is smaller than this share of an undistorted one is folded or nearly so.
