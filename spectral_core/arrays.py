@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -25,14 +27,28 @@ def frozen(values: npt.ArrayLike) -> Float64Array:
 
 # Pixels at a time, so that what is in between stays in the processor's cache: three times as fast.
 _BLOCK = 16_384
+# Fewer than these are done before a thread has started.
+_FEWEST_FOR_THREADS = 8 * _BLOCK
 
 
 def in_blocks(function: Callable[[Float64Array], Float64Array], colours: npt.ArrayLike) -> Float64Array:
-    """A function of channels (3, n) on colours (..., 3), some tens of thousands at a time."""
+    """A function of channels (3, n) on colours (..., 3), some tens of thousands at a time.
+
+    Images go to all processors: what numpy does in a block runs beside the interpreter.
+    """
     colours = np.asarray(colours, dtype=np.float64)
     flat = colours.reshape(-1, 3)
     result = np.empty_like(flat)
-    for first in range(0, len(flat), _BLOCK):
+
+    def one(first: int) -> None:
         block = slice(first, first + _BLOCK)
         result[block] = function(np.ascontiguousarray(flat[block].T)).T
+
+    starts = range(0, len(flat), _BLOCK)
+    if len(flat) < _FEWEST_FOR_THREADS:
+        for first in starts:
+            one(first)
+    else:
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            list(pool.map(one, starts))
     return np.asarray(result.reshape(colours.shape))
