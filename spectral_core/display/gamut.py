@@ -24,6 +24,8 @@ GamutRule = Literal["clip", "chromaticity", "keep"]
 GAMUT_RULES: tuple[GamutRule, ...] = get_args(GamutRule)
 # In linear drive: rounding, not colour.
 _ROUNDING = 1e-9
+# A drive that rises by less with the luminance never gets full, and dividing by it overflows.
+_FLAT = 1e-100
 # Far beyond any display's white: larger colours are scaled to this, lest their sums overflow.
 _LARGEST_XYZ = 1e6
 # No display is brighter than this many times its white at any chromaticity.
@@ -168,7 +170,7 @@ def _largest_scale(model: DisplayModel, XYZ: Float64Array, white: Float64Array, 
         over = (drive > white).any(axis=1)
         high[waiting], low[waiting] = np.where(over, at, high[waiting]), np.where(over, low[waiting], at)
         slope = (drive - drive_before[waiting]) / (at - before[waiting])[:, None]
-        rising = slope > 0
+        rising = slope > _FLAT
         reached = np.where(rising, at[:, None] + (white - drive) / np.where(rising, slope, 1.0), np.inf).min(axis=1)
         inside = (reached >= low[waiting]) & (reached <= high[waiting])
         before[waiting], drive_before[waiting] = at, drive
