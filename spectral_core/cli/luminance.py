@@ -99,7 +99,7 @@ def add_luminance_commands(group: click.Group) -> None:
     group.add_command(field)
 
 
-_FIELD_COLUMNS = ("patch", "points", "min", "mean", "max", "%/deg", "max dE00", "max du'v'", "map", "held out")
+_FIELD_COLUMNS = ("patch", "points", "min", "mean", "max", "%/deg", "max dE00", "max du'v'", "degree", "held out")
 
 
 def _field_rows(found: FieldReport) -> list[list[object]]:
@@ -107,7 +107,7 @@ def _field_rows(found: FieldReport) -> list[list[object]]:
         [
             each.name, len(each.points_deg), each.luminance.min, each.luminance.mean, each.luminance.max,
             each.fall_off_percent_per_degree, each.dE00.max if each.dE00 else None,
-            each.delta_uv.max if each.delta_uv else None, f"degree {each.map.degree}" if each.map else "none",
+            each.delta_uv.max if each.delta_uv else None, each.map.degree if each.map else None,
             each.map.held_out_rms if each.map else None,
         ]
         for each in found.patches

@@ -26,6 +26,8 @@ _WIDEST_FIELD = 180.0
 # The centre is where a reading was meant to be at 0, 0, give or take the aiming.
 _CENTRE_DEG, _FARTHEST_CENTRE_DEG = 0.5, 2.5
 _DEGREES = range(5)
+# Of squared relative luminance: what is smaller is no difference between maps.
+_ROUNDING = 1e-12
 _NAMES = {(1, 1, 1): "white", (1, 0, 0): "red", (0, 1, 0): "green", (0, 0, 1): "blue", (0, 0, 0): "black"}
 
 
@@ -293,7 +295,7 @@ def fit_map(points_deg: Float64Array, relative: Float64Array) -> FieldMap | None
     for degree in _DEGREES:
         terms = _terms(scaled, degree)
         kept = [group != index for index in range(len(places))]
-        # One point more than terms is the least that leaves something to tell.
+        # Two points more than terms: one to hold out, one to tell a fit from a copy.
         if len(places) < terms.shape[1] + 2 or not all(_solvable(scaled[each], degree) for each in kept):
             break
         error = np.empty(len(places))
@@ -303,7 +305,9 @@ def fit_map(points_deg: Float64Array, relative: Float64Array) -> FieldMap | None
         trials.append(error)
     best = min(trials, key=lambda each: float(each.mean()))
     degree = next(
-        index for index, each in enumerate(trials) if (each - best).mean() <= (each - best).std() / np.sqrt(len(places))
+        index
+        for index, each in enumerate(trials)
+        if (each - best).mean() <= max((each - best).std() / np.sqrt(len(places)), _ROUNDING)
     )
     terms = _terms(scaled, degree)
     coefficients = _solve(terms, relative)

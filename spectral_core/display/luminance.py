@@ -241,6 +241,7 @@ def _black_limit(profile: DisplayProfile, colours: tuple[SceneColour, ...], fact
     black = float(profile.to_XYZ(np.zeros(3))[1])
     lowest = max(black, 0.0) / factor
     Y = np.array([each.XYZ[1] for each in colours])
+    dark = np.less(Y, lowest)
     found = reach(profile.model, factor * np.stack([each.XYZ for each in colours]))
     darkest, brightest = colours[int(Y.argmin())], float(Y.max())
     wanted, shown = brightest / float(Y.min()), brightest / max(float(Y.min()), lowest)
@@ -250,8 +251,8 @@ def _black_limit(profile: DisplayProfile, colours: tuple[SceneColour, ...], fact
         luminance_cd_m2=None if peak is None else max(black, 0.0) * peak,
         darkest=f"{darkest.name} under {darkest.light}",
         darkest_Y=float(Y.min()),
-        crushed=_named(colours, Y < lowest),
-        tinted=_named(colours, found.attainable & ~found.inside & (found.scale >= 1) & (Y >= lowest)),
+        crushed=_named(colours, dark),
+        tinted=_named(colours, found.attainable & ~found.inside & (found.scale >= 1) & ~dark),
         contrast_scene=wanted,
         contrast_shown=max(shown, 1.0),
         contrast_lost_stops=float(np.log2(wanted / max(shown, 1.0))),
