@@ -10,7 +10,7 @@ import click
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.cli.console import Document, emit, facts, table
+from spectral_core.cli.console import Document, emit, facts, rounded, table
 from spectral_core.cli.options import FiniteRange, as_json, observer_option, profile_option
 from spectral_core.display import load_profile
 from spectral_core.display.field import FieldReport, field_report, read_field
@@ -99,19 +99,19 @@ def add_luminance_commands(group: click.Group) -> None:
     group.add_command(field)
 
 
-_FIELD_COLUMNS = ("patch", "points", "min", "mean", "max", "%/deg", "max dE00", "max du'v'", "degree", "held out")
+_FIELD_COLUMNS = ("patch", "n", "min", "mean", "max", "%/deg", "dE00", "du'v'", "map", "error")
 
 
 def _field_rows(found: FieldReport) -> list[list[object]]:
-    return [
-        [
-            each.name, len(each.points_deg), each.luminance.min, each.luminance.mean, each.luminance.max,
-            each.fall_off_percent_per_degree, each.dE00.max if each.dE00 else None,
-            each.delta_uv.max if each.delta_uv else None, each.map.degree if each.map else None,
-            each.map.held_out_rms if each.map else None,
-        ]
-        for each in found.patches
-    ]  # fmt: skip
+    """Largest colour differences; the map's degree and its held-out error."""
+    rows: list[list[object]] = []
+    for each in found.patches:
+        span = (each.luminance.min, each.luminance.mean, each.luminance.max, each.fall_off_percent_per_degree)
+        shifts = (each.dE00.max if each.dE00 else None, each.delta_uv.max if each.delta_uv else None)
+        degree, error = (each.map.degree, each.map.held_out_rms) if each.map else (None, None)
+        figures = [*rounded(span, 3), *rounded(shifts[:1], 2), *rounded(shifts[1:], 4)]
+        rows.append([each.name, len(each.points_deg), *figures, degree, *rounded([error], 4)])
+    return rows
 
 
 def _scene(spectra: Spectra, light: Light, observer: str) -> list[SceneColour]:

@@ -158,7 +158,7 @@ def profile_document(display: DisplayProfile) -> Document:
         "peak_luminance_cd_m2": _times(white[1], display.white_luminance_cd_m2),
         "black_luminance_cd_m2": _times(black[1], display.white_luminance_cd_m2),
         "white_luminance_cd_m2": display.white_luminance_cd_m2,
-        "scene_white": scene_white(display),
+        "scene_white": _scene_white(display),
         "scene_white_set": display.scene_white is not None,
         "warnings": warnings,
     }
@@ -186,6 +186,14 @@ def _with(display: DisplayProfile, given: Mapping[str, Any]) -> DisplayProfile:
     return replace(display, **changes)
 
 
+def _scene_white(display: DisplayProfile) -> float | None:
+    """None for a display that has no D65 and was given nothing."""
+    try:
+        return scene_white(display)
+    except DisplayError:
+        return None
+
+
 def _times(Y: float, luminance: float | None) -> float | None:
     return None if luminance is None else float(Y * luminance)
 
@@ -207,7 +215,8 @@ def _plain(value: Any) -> str:
 
 def _told(document: Document) -> dict[str, str]:
     """Entries that need a sentence for people."""
-    absolute = document["peak_luminance_cd_m2"]
+    absolute, fraction = document["peak_luminance_cd_m2"], document["scene_white"]
+    default = "" if document["scene_white_set"] else " (default)"
     return {
         "primaries": "; ".join(
             f"{channel}: x {each['xy'][0]:.4f}, y {each['xy'][1]:.4f}, Y {each['Y']:.4f}"
@@ -216,8 +225,7 @@ def _told(document: Document) -> dict[str, str]:
         "gamma": ", ".join(f"{channel} {each['value']:.3f}" for channel, each in document["gamma"].items()),
         "contrast": f"{document['contrast']:.0f} : 1" if document["contrast"] else "unknown: no light in black",
         "peak_luminance_cd_m2": "unknown: the profile is relative" if absolute is None else f"{absolute:.4g}",
-        "scene_white": f"{document['scene_white']:.4f} of white"
-        + ("" if document["scene_white_set"] else " (default)"),
+        "scene_white": "none: D65 is out of reach" if fraction is None else f"{fraction:.4f} of white{default}",
     }
 
 

@@ -101,8 +101,10 @@ def map_to_gamut(
     Raises
     ------
     DisplayError
-        If a value of XYZ is not finite.
+        If a value of XYZ is not finite, or there is no such rule.
     """
+    if rule not in GAMUT_RULES:
+        raise DisplayError(f"no rule '{rule}' for colours out of gamut", remedy=f"use {', '.join(GAMUT_RULES)}")
     model = display.model if isinstance(display, DisplayProfile) else display
     wanted = _moderate(XYZ)
     codes = model.inverse(wanted)

@@ -117,7 +117,9 @@ def test_too_bright_a_colour_keeps_its_chromaticity(name: str, code: list[float]
         np.testing.assert_allclose(xy(shown), xy(XYZ), atol=1e-6)
         assert shown[1] == pytest.approx(min(limit, 1.0) * XYZ[1], rel=1e-9)
         assert peak_luminance(model(name), XYZ) == pytest.approx(limit * XYZ[1], rel=1e-9)
-    assert counts.luminance == (1 if 0 < limit < 0.999 else 0) or 0.999 <= limit < 1.001
+    # Within a thousandth of fitting, clipping may change less than is counted.
+    if not 0.999 <= limit < 1.001:
+        assert counts.luminance == int(0 < limit < 0.999)
 
 
 @pytest.mark.parametrize("name", LINEAR)
@@ -132,7 +134,6 @@ def test_foreign_chromaticities_move_straight_to_the_gamuts_edge(name: str) -> N
         shown = display.forward(found)
         assert (counts.chromaticity, counts.luminance) == (1, 0)
         assert shown[1] == pytest.approx(asked[1], rel=1e-6)
-        assert found.min() == pytest.approx(display.forward(np.zeros(3))[1] * 0, abs=0.08)
         black, white = display.forward(np.zeros(3)), display.forward(np.ones(3))
         share = (asked[1] - black[1]) / (white[1] - black[1])
         start, end = uv(asked), uv(black + share * (white - black))
@@ -162,6 +163,8 @@ def test_extremes_give_numbers(name: str, rule: str) -> None:
     found, counts = map_to_gamut(model(name), asked, rule)  # type: ignore[arg-type]
     assert np.isfinite(found).all()
     assert counts.total == 6
+    with pytest.raises(DisplayError, match="no rule"):
+        map_to_gamut(model(name), asked, "squeeze")  # type: ignore[arg-type]
     with pytest.raises(DisplayError, match="finite"):
         map_to_gamut(model(name), np.array([[np.nan, 0, 0]]), "clip")
 

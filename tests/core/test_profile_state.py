@@ -184,6 +184,18 @@ def test_relative_profiles_say_so(run: Run) -> None:
     assert found["model"] == "sRGB"
 
 
+def test_a_display_without_d65_is_still_shown(run: Run, tmp_path: Path) -> None:
+    """Three reds: no white to speak of."""
+    path = tmp_path / "reds.json"
+    reds = np.array([[0.5, 0.4, 0.3], [0.3, 0.2, 0.1], [0.01, 0.02, 0.0]])
+    write_profile(DisplayProfile("reds", GammaMatrix(np.full(3, 2.2), reds, np.zeros(3))), path)
+    code, out, _ = run("profile", "show", path, "--json")
+    assert (code, json.loads(out)["scene_white"]) == (0, None)
+    code, _, err = run("luminance", "--profile", path)
+    assert code == 2
+    assert "cannot show D65" in err
+
+
 def test_profile_set_keeps_the_model(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "p.json"
     code, _, _ = run(
