@@ -6,6 +6,7 @@ import csv
 import io
 import sys
 from pathlib import Path
+from typing import Any
 
 import click
 import numpy as np
@@ -13,11 +14,12 @@ import numpy as np
 from spectral_core.arrays import Float64Array
 from spectral_core.cli.console import emit, rounded, table
 from spectral_core.cli.options import as_json, observer_option, profile_option
-from spectral_core.display import DisplayProfile, load_profile, write_profile
+from spectral_core.cli.profile import make_profile, profile_warnings, state_options
+from spectral_core.display import load_profile, write_profile
 from spectral_core.display.characterise import characterise as choose
 from spectral_core.display.fitting import MODEL_KINDS
+from spectral_core.display.gamut import GAMUT_RULES, GamutCounts, map_to_gamut
 from spectral_core.display.measurements import read_measurements
-from spectral_core.display.profile import in_gamut
 from spectral_core.documents import characterise_document
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
@@ -32,9 +34,10 @@ _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
 @click.option(
     "--model", type=click.Choice([kind.name for kind in MODEL_KINDS]), help="use this one instead of the best"
 )
+@state_options
 @observer_option
 @as_json
-def characterise(file: Path, output: Path | None, model: str | None, observer: str, json: bool) -> None:
+def characterise(file: Path, output: Path | None, model: str | None, observer: str, json: bool, **given: Any) -> None:
     """Choose a model for a display measured in FILE, by its error on colours held out.
 
     FILE is Argyll's .ti3, or CSV: R,G,B,X,Y,Z or R,G,B,x,y,Y or rows Red, Green, Blue, White, Black.
@@ -46,8 +49,10 @@ def characterise(file: Path, output: Path | None, model: str | None, observer: s
         source = f"characterised from {file.name}, {len(found.measured.codes)} patches, {measured.instrument}".rstrip(
             ", "
         )
-        write_profile(DisplayProfile(output.stem, found.chosen.model, source, float(measured.white_XYZ[1])), output)
+        profile = make_profile(output.stem, found.chosen.model, source, measured, given)
+        write_profile(profile, output)
         document["file"] = str(output)
+        document["warnings"] += profile_warnings(profile, measured)
     rows = []
     for each in document["models"]:
         held_out = each["held_out"] or {"mean": None, "p95": None, "max": None}
@@ -63,24 +68,26 @@ def characterise(file: Path, output: Path | None, model: str | None, observer: s
 @click.command()
 @profile_option
 @click.option("--to", "target", type=click.Choice(["xyz", "codes"]), required=True)
-@click.option("--keep", is_flag=True, help="do not clip codes that are out of gamut")
+@click.option(
+    "--gamut", type=click.Choice(GAMUT_RULES), default="clip", show_default=True, help="what becomes of other colours"
+)
+@click.option("--keep", is_flag=True, help="the same as --gamut keep")
 @click.argument("file", type=_PATH, required=False)
-def convert(profile: str, target: str, keep: bool, file: Path | None) -> None:
+def convert(profile: str, target: str, gamut: Any, keep: bool, file: Path | None) -> None:
     """Convert a CSV (standard input without FILE) between codes R,G,B (0..1) and X,Y,Z.
 
-    XYZ is in the units of the profile's measurements. Codes out of gamut are clipped channel by
-    channel, and counted on standard error.
+    XYZ is in the units of the profile's measurements. Colours out of gamut are clipped channel by
+    channel, or keep their chromaticity and lose luminance (`chromaticity`), or give codes outside
+    0..1 (`keep`); they are counted on standard error.
     """
     display = load_profile(profile)
     values = _read(file, _HEADERS[target])
     if target == "xyz":
         result = display.to_XYZ(values) * display.white_Y
     else:
-        result = display.to_codes(values / display.white_Y)
-        outside = int((~in_gamut(result)).sum())
-        if outside:
-            print(f"warning: {outside} of {len(result)} colours are out of gamut", file=sys.stderr)
-        result = result if keep else np.clip(result, 0.0, 1.0)
+        result, counts = map_to_gamut(display, values / display.white_Y, "keep" if keep else gamut)
+        if counts.outside:
+            print(f"warning: {_told(counts)}", file=sys.stderr)
     writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(_HEADERS["codes" if target == "xyz" else "xyz"])
     writer.writerows([f"{value:.9g}" for value in row] for row in result)
@@ -90,6 +97,13 @@ def add_display_commands(group: click.Group) -> None:
     """Add this module's commands to the program."""
     group.add_command(characterise)
     group.add_command(convert)
+
+
+def _told(counts: GamutCounts) -> str:
+    return (
+        f"{counts.outside} of {counts.total} colours are out of gamut: {counts.luminance} by luminance, "
+        f"{counts.chromaticity} by chromaticity, {counts.black} too dark for the display's black"
+    )
 
 
 def _read(file: Path | None, header: list[str]) -> Float64Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ import numpy as np
 from spectral_core import weights
 from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.display.cgats import parse_cgats
+from spectral_core.display.state import iso_date
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
 from spectral_core.standards import DEFAULT_OBSERVER
@@ -42,6 +43,10 @@ class Measurements:
         What measured, as the file says.
     warnings
         What a user should know of the file.
+    date
+        When it was measured, ISO 8601; None if the file does not say.
+    white_luminance_cd_m2
+        Of white, where the file says it although its unit is relative.
     """
 
     codes: Float64Array
@@ -49,12 +54,12 @@ class Measurements:
     unit: str = "relative"
     instrument: str = ""
     warnings: tuple[str, ...] = ()
+    date: str | None = None
+    white_luminance_cd_m2: float | None = None
 
     def subset(self, chosen: BoolArray | np.ndarray) -> Measurements:  # type: ignore[type-arg]
         """The patches of a mask or of indices."""
-        return Measurements(
-            frozen(self.codes[chosen]), frozen(self.XYZ[chosen]), self.unit, self.instrument, self.warnings
-        )
+        return replace(self, codes=frozen(self.codes[chosen]), XYZ=frozen(self.XYZ[chosen]))
 
     @property
     def grey(self) -> BoolArray:
@@ -119,10 +124,24 @@ def _from_cgats(text: str, path: Path, observer: str) -> Measurements:
     elif from_spectra is not None:
         warnings += _disagreement(XYZ, from_spectra)
     relative = table.keywords.get("NORMALIZED_TO_Y_100", "NO").upper() == "YES"
-    instrument = table.keywords.get("TARGET_INSTRUMENT", "")
     return Measurements(
-        frozen(codes / 100), frozen(XYZ), "relative" if relative else "cd/m2", instrument, tuple(warnings)
+        frozen(codes / 100),
+        frozen(XYZ),
+        "relative" if relative else "cd/m2",
+        table.keywords.get("TARGET_INSTRUMENT", ""),
+        tuple(warnings),
+        iso_date(table.keywords.get("CREATED", "")),
+        _stated_luminance(table.keywords.get("LUMINANCE_XYZ_CDM2", "")) if relative else None,
     )
+
+
+def _stated_luminance(text: str) -> float | None:
+    """Luminance in cd/m2 of Argyll's ``X Y Z`` of white; None if it is none."""
+    try:
+        _, luminance, _ = (float(part) for part in text.split())
+    except ValueError:
+        return None
+    return luminance if 0 < luminance < math.inf else None
 
 
 def _spectral_XYZ(columns: dict[str, Float64Array], observer: str) -> Float64Array | None:

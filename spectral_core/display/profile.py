@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from spectral_core.arrays import BoolArray, Float64Array, FloatArray
 from spectral_core.display.corrected import CorrectedLut
 from spectral_core.display.models import DisplayModel, GammaMatrix, SRGBCurve
+from spectral_core.display.state import HeadsetState
 from spectral_core.display.tone_models import GainOffsetGamma, LutMatrix
 from spectral_core.errors import DisplayError
 from spectral_core.files import atomic_path, is_file, read_text, why_no_file
@@ -29,6 +30,10 @@ MODELS: dict[str, Any] = {
 # CIE D65's table differs from sRGB's rounded white point by 9e-5 in linear RGB: the display's own
 # white is not out of its gamut.
 GAMUT_TOLERANCE = 1e-4
+UNITS = ("cd/m2", "relative")
+# Brighter than any display: the sun's disc.
+_LARGEST_LUMINANCE = 2e9
+_LARGEST_FLOAT = float(np.finfo(np.float64).max)
 
 
 @dataclass(frozen=True)
@@ -44,13 +49,42 @@ class DisplayProfile:
     source
         Where its numbers are from.
     white_Y
-        Luminance of white in the units it was measured in (cd/m2 or relative); 1 if not measured.
+        Luminance of white in the unit of the measurements; 1 if not measured.
+    unit
+        Of the measurements: ``cd/m2``, or ``relative`` (to a white of 100, or of 1).
+    white_luminance_cd_m2
+        Luminance of white, None if unknown; with the unit ``cd/m2`` it is `white_Y`.
+    state
+        What was measured, and in what state.
+    scene_white
+        Luminance that a scene's white is shown at, as a fraction of white's, above 0 and up to 1;
+        None for the default (`spectral_core.display.luminance.scene_white`).
     """
 
     name: str
     model: DisplayModel
     source: str = ""
     white_Y: float = 1.0
+    unit: str = "relative"
+    white_luminance_cd_m2: float | None = None
+    state: HeadsetState = field(default_factory=HeadsetState)
+    scene_white: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "white_Y", _positive("white_Y", self.white_Y, _LARGEST_FLOAT))
+        if self.unit not in UNITS:
+            raise DisplayError("'unit' is no unit of luminance", remedy=f"use {' or '.join(UNITS)}")
+        luminance = self.white_Y if self.unit == "cd/m2" else self.white_luminance_cd_m2
+        if luminance is not None:
+            luminance = _positive("white_luminance_cd_m2", luminance, _LARGEST_LUMINANCE)
+        if self.white_luminance_cd_m2 not in (None, luminance):
+            raise DisplayError(
+                f"white has {self.white_luminance_cd_m2} cd/m2, but {self.white_Y} in the measurements",
+                remedy="correct one of them, or make the unit 'relative'",
+            )
+        object.__setattr__(self, "white_luminance_cd_m2", luminance)
+        if self.scene_white is not None:
+            object.__setattr__(self, "scene_white", _positive("scene_white", self.scene_white, 1.0))
 
     def to_XYZ(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3), white Y = 1, of device codes (..., 3) from 0 to 1."""
@@ -70,6 +104,13 @@ def in_gamut(values: FloatArray) -> BoolArray:
     return np.asarray(((values >= -GAMUT_TOLERANCE) & (values <= 1 + GAMUT_TOLERANCE)).all(axis=-1))
 
 
+def _positive(name: str, value: Any, largest: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= largest:
+        limit = "" if largest > _LARGEST_LUMINANCE else f" and up to {largest:g}"
+        raise DisplayError(f"'{name}' is no number above 0{limit}", remedy="correct it")
+    return float(value)
+
+
 def write_profile(profile: DisplayProfile, path: Path) -> None:
     """Write a profile as JSON that `read_profile` gives back bit for bit."""
     kind = next((name for name, model in MODELS.items() if isinstance(profile.model, model)), None)
@@ -82,6 +123,10 @@ def write_profile(profile: DisplayProfile, path: Path) -> None:
         "name": profile.name,
         "source": profile.source,
         "white_Y": profile.white_Y,
+        "unit": profile.unit,
+        "white_luminance_cd_m2": profile.white_luminance_cd_m2,
+        "scene_white": profile.scene_white,
+        "state": profile.state.to_json(),
         "model": {"type": kind, **model.to_json()},
     }
     with atomic_path(path) as temporary:
@@ -90,6 +135,8 @@ def write_profile(profile: DisplayProfile, path: Path) -> None:
 
 def read_profile(path: Path) -> DisplayProfile:
     """Read a profile written by `write_profile`.
+
+    Files that lack the unit, the state or the scene's white are older: nothing is known of these.
 
     Raises
     ------
@@ -103,14 +150,21 @@ def read_profile(path: Path) -> DisplayProfile:
             where=path,
             remedy=f"it must say format '{_FORMAT}', version {_VERSION}",
         )
-    model, white_Y = document.get("model"), document.get("white_Y", 1.0)
+    model = document.get("model")
     kind = MODELS.get(str(model.get("type"))) if isinstance(model, dict) else None
     if kind is None or not isinstance(model, dict):
         raise DisplayError("has no model of a known type", where=path, remedy=f"known are {', '.join(MODELS)}")
-    if isinstance(white_Y, bool) or not isinstance(white_Y, (int, float)) or not 0 < white_Y < np.inf:
-        raise DisplayError("'white_Y' is no luminance", where=path, remedy="correct the profile")
     try:
-        made = kind.from_json(model)
+        return DisplayProfile(
+            str(document.get("name", path.stem)),
+            kind.from_json(model),
+            str(document.get("source", "")),
+            document.get("white_Y", 1.0),
+            document.get("unit", "relative"),
+            document.get("white_luminance_cd_m2"),
+            HeadsetState.from_json(document.get("state", {})),
+            document.get("scene_white"),
+        )
     except KeyError as error:
         raise DisplayError(f"the model lacks {error}", where=path, remedy="correct the profile") from None
     except (TypeError, ValueError, OverflowError):
@@ -119,13 +173,13 @@ def read_profile(path: Path) -> DisplayProfile:
         ) from None
     except DisplayError as error:
         raise DisplayError(error.problem, where=path, remedy=error.remedy) from None
-    return DisplayProfile(str(document.get("name", path.stem)), made, str(document.get("source", "")), float(white_Y))
 
 
 def _json_text(document: dict[str, Any]) -> str:
-    """JSON with one line per list of numbers: a table of 17 x 17 x 17 colours stays legible."""
+    """JSON with one line per list of numbers: a table of 13 x 13 x 13 colours stays legible."""
     text = json.dumps(document, indent=2)
-    return re.sub(r"\[([^\[\]{}]*)\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
+    # No text of JSON holds a line's end: what begins with one is a list.
+    return re.sub(r"\[\n([^\[\]{}\"]*)\]", lambda found: f"[{' '.join(found[1].split())}]", text) + "\n"
 
 
 def _json(path: Path) -> dict[str, Any]:
