@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +42,8 @@ class Measurements:
         What measured, as the file says.
     warnings
         What a user should know of the file.
+    created
+        When it was measured, as the file says.
     """
 
     codes: Float64Array
@@ -49,12 +51,11 @@ class Measurements:
     unit: str = "relative"
     instrument: str = ""
     warnings: tuple[str, ...] = ()
+    created: str = ""
 
     def subset(self, chosen: BoolArray | np.ndarray) -> Measurements:  # type: ignore[type-arg]
         """The patches of a mask or of indices."""
-        return Measurements(
-            frozen(self.codes[chosen]), frozen(self.XYZ[chosen]), self.unit, self.instrument, self.warnings
-        )
+        return replace(self, codes=frozen(self.codes[chosen]), XYZ=frozen(self.XYZ[chosen]))
 
     @property
     def grey(self) -> BoolArray:
@@ -120,9 +121,8 @@ def _from_cgats(text: str, path: Path, observer: str) -> Measurements:
         warnings += _disagreement(XYZ, from_spectra)
     relative = table.keywords.get("NORMALIZED_TO_Y_100", "NO").upper() == "YES"
     instrument = table.keywords.get("TARGET_INSTRUMENT", "")
-    return Measurements(
-        frozen(codes / 100), frozen(XYZ), "relative" if relative else "cd/m2", instrument, tuple(warnings)
-    )
+    unit, created = "relative" if relative else "cd/m2", table.keywords.get("CREATED", "")
+    return Measurements(frozen(codes / 100), frozen(XYZ), unit, instrument, tuple(warnings), created)
 
 
 def _spectral_XYZ(columns: dict[str, Float64Array], observer: str) -> Float64Array | None:

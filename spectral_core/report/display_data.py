@@ -1,0 +1,149 @@
+"""What the display report's plots and tables draw from: ramps with their models, held-out errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spectral_core.arrays import Float64Array
+from spectral_core.display.characterise import Characterisation
+from spectral_core.display.fitting import primaries
+from spectral_core.display.gamut import XYZ_to_xy, xy_to_uv
+from spectral_core.display.measurements import Measurements
+from spectral_core.standards import XYZ_to_Lab
+
+# With fewer levels there is no curve to show, only its end.
+_FEWEST_LEVELS = 3
+_EVEN_CODES = 201
+# Arrows of the larger errors shall be about this long, in units of a*, b*.
+_ARROW = 15.0
+_MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """Luminance along a ramp, over that at full drive, and what the models make of it.
+
+    Attributes
+    ----------
+    codes, luminance
+        (n,) of the measured patches, in rising order.
+    black
+        Luminance at codes 0.
+    even_codes, curves
+        (m,) codes, and by model the luminances there.
+    residual_percent
+        By model, (n,) model less measured in percent of measured.
+    """
+
+    name: str
+    codes: Float64Array
+    luminance: Float64Array
+    black: float
+    even_codes: Float64Array
+    curves: dict[str, Float64Array]
+    residual_percent: dict[str, Float64Array]
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Mixed colours with their prediction by fits without them; CIELAB relative to the display's white.
+
+    Attributes
+    ----------
+    codes, measured, predicted
+        (n, 3); `measured` and `predicted` are CIELAB.
+    uv, triangle
+        (n, 2) CIE 1976 chromaticities as measured, (3, 2) those of the primaries.
+    dE00
+        (n,).
+    """
+
+    codes: Float64Array
+    measured: Float64Array
+    predicted: Float64Array
+    measured_over_white: Float64Array
+    predicted_over_white: Float64Array
+    uv: Float64Array
+    triangle: Float64Array
+    dE00: Float64Array
+
+    @property
+    def change(self) -> Float64Array:
+        """(n, 3) predicted less measured L*, a*, b*."""
+        return np.asarray(self.predicted - self.measured)
+
+    @property
+    def mean_change(self) -> Float64Array:
+        """(3,) mean of `change`: what the model is off by on the whole."""
+        return np.asarray(self.change.mean(axis=0))
+
+    @property
+    def magnification(self) -> float:
+        """How much longer arrows of a*, b* are drawn than they are."""
+        large = float(np.percentile(np.hypot(*self.change[:, 1:].T), 95))
+        return next((each for each in reversed(_MAGNIFICATIONS) if each * large <= _ARROW), _MAGNIFICATIONS[0])
+
+
+def ramps(found: Characterisation) -> list[Ramp]:
+    """The ramps of red, green, blue and grey that were measured at enough levels."""
+    chosen = {name: found.measured.channel(index) for index, name in enumerate(("red", "green", "blue"))}
+    directions = {"red": (1, 0, 0), "green": (0, 1, 0), "blue": (0, 0, 1), "grey": (1, 1, 1)}
+    masks = {**chosen, "grey": found.measured.grey}
+    return [
+        _ramp(found, name, np.array(direction, dtype=np.float64), masks[name])
+        for name, direction in directions.items()
+        if len(np.unique(found.measured.codes[masks[name]].max(axis=1))) >= _FEWEST_LEVELS
+    ]
+
+
+def _ramp(found: Characterisation, name: str, direction: Float64Array, mask: np.ndarray) -> Ramp:  # type: ignore[type-arg]
+    measured = found.measured.subset(mask)
+    codes = measured.codes.max(axis=1)
+    # Black has no place on a logarithmic axis, and no residual in percent where it reads 0.
+    order = [index for index in np.argsort(codes, kind="stable") if codes[index] > 0 and measured.XYZ[index, 1] > 0]
+    full = found.measured.at(*direction)
+    assert full is not None  # checked when the file was read
+    even = np.linspace(0, 1, _EVEN_CODES)
+    luminance = measured.XYZ[order, 1] / full[1]
+    curves = {each.name: each.model.forward(even[:, None] * direction)[:, 1] / full[1] for each in found.models}
+    modelled = {each.name: each.model.forward(measured.codes[order])[:, 1] / full[1] for each in found.models}
+    return Ramp(
+        name,
+        codes[order],
+        luminance,
+        float(found.measured.black_XYZ[1] / full[1]),
+        even[1:],
+        {key: values[1:] for key, values in curves.items()},
+        {key: 100 * (values / luminance - 1) for key, values in modelled.items()},
+    )
+
+
+def primaries_XYZ(measured: Measurements) -> Float64Array:
+    """(3, 3), rows the XYZ of red, green and blue at full drive as measured, black included."""
+    return primaries(measured, np.zeros(3)).T
+
+
+def held_out(found: Characterisation) -> HeldOut | None:
+    """Of the chosen model; None if there were too few mixed colours to test it."""
+    result = found.chosen
+    if result.held_out is None:
+        return None
+    measured, white = found.held_out, found.measured.white_XYZ
+    return HeldOut(
+        measured.codes,
+        XYZ_to_Lab(measured.XYZ, white),
+        XYZ_to_Lab(result.held_out_XYZ, white),
+        measured.XYZ / white,
+        result.held_out_XYZ / white,
+        xy_to_uv(XYZ_to_xy(measured.XYZ)),
+        xy_to_uv(XYZ_to_xy(primaries_XYZ(found.measured))),
+        result.held_out_errors,
+    )
+
+
+def worst(held: HeldOut, count: int) -> Sequence[int]:
+    """Indices of the largest errors, the largest first."""
+    return [int(index) for index in np.argsort(-held.dE00, kind="stable")[:count]]
