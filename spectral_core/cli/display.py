@@ -39,7 +39,9 @@ _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
     "--model", type=click.Choice([kind.name for kind in MODEL_KINDS]), help="use this one instead of the best"
 )
 @click.option("--report", type=_PATH, help="write an HTML report there")
-@click.option("--right", type=_PATH, metavar="FILE", help="the right eye, FILE is then the left: both go into the report")
+@click.option(
+    "--right", type=_PATH, metavar="FILE", help="the right eye, FILE is then the left: both go into the report"
+)
 @observer_option
 @as_json
 def characterise(

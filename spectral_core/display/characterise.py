@@ -135,7 +135,13 @@ def _on_trial(measured: Measurements, kind: ModelKind) -> ModelResult:
     outside = held_out_errors(measured, predicted)
     inside = errors(model, measured, measured.white_XYZ)
     return ModelResult(
-        kind.name, model, percentiles(outside) if len(outside) else None, outside, predicted, percentiles(inside), _cost(model)
+        kind.name,
+        model,
+        percentiles(outside) if len(outside) else None,
+        outside,
+        predicted,
+        percentiles(inside),
+        _cost(model),
     )
 
 

@@ -35,9 +35,6 @@ class DisplayModel(Protocol):
     def encode(self, linear: FloatArray) -> Float64Array:
         """Device codes of linear device RGB, not clipped."""
 
-    def to_json(self) -> dict[str, object]:
-        """Plain numbers."""
-
 
 def signed_power(values: FloatArray, exponent: Float64Array | float) -> Float64Array:
     """sign(v) |v|^exponent: a power that never gives NaN."""

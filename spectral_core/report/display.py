@@ -15,12 +15,12 @@ from spectral_core.display.eyes import eye_difference
 from spectral_core.display.gamut import XYZ_to_xy, xy_to_uv
 from spectral_core.display.measurements import Measurements
 from spectral_core.report import display_findings, display_plots, display_tables
-from spectral_core.report.display_data import held_out, ramps
+from spectral_core.report.display_data import DARK_GREY, held_out, ramps, visible_greys
 from spectral_core.report.extras import extra
 from spectral_core.report.pages import write_page
 from spectral_core.standards import cct_and_duv, srgb_to_XYZ_matrix
 
-_SEPARATE_GREYS = 3
+_FEWEST_GREYS = 3
 
 
 @dataclass(frozen=True)
@@ -71,14 +71,15 @@ def write_display_report(path: Path, report: DisplayReport) -> None:
 
 def _context(report: DisplayReport) -> dict[str, Any]:
     eyes = report.eyes
-    greys = {each.name: _greys(each.found.measured) for each in eyes}
-    greys = {name: grey for name, grey in greys.items() if len(grey.codes) >= _SEPARATE_GREYS}
+    greys = {each.name: visible_greys(each.found.measured) for each in eyes}
+    greys = {name: grey for name, grey in greys.items() if len(grey.codes) >= _FEWEST_GREYS}
     found = {each.name: each.found for each in eyes}
     return {
-        "title": f"{' and '.join(each.file for each in eyes)}: display characterisation",
+        "title": f"Display characterisation: {eyes[0].file if len(eyes) == 1 else 'both eyes'}",
         "eyes": [_eye(each) for each in eyes],
         "gamut_plot": display_plots.gamut_plot({each.name: each.read for each in eyes}),
         "grey_plot": display_plots.grey_plot(greys, found) if greys else None,
+        "dark_grey": DARK_GREY,
         "both": _both(eyes[0], eyes[1]) if len(eyes) > 1 else None,
         "command": report.command,
         "made": report.made.isoformat(),
@@ -132,12 +133,6 @@ def _white(read: Measurements) -> dict[str, float]:
     d65 = XYZ_to_xy(srgb_to_XYZ_matrix().sum(axis=1))
     du, dv = xy_to_uv(xy) - xy_to_uv(d65)
     return {"Y": float(read.white_XYZ[1]), "cct_K": cct, "duv": duv, "from_D65": float((du**2 + dv**2) ** 0.5)}
-
-
-def _greys(measured: Measurements) -> Measurements:
-    """The greys that have a chromaticity, in rising order."""
-    order = measured.codes.mean(axis=1).argsort(kind="stable")
-    return measured.subset([index for index in order if measured.grey[index] and (measured.XYZ[index] > 0).all()])
 
 
 def _both(left: Eye, right: Eye) -> dict[str, Any]:

@@ -17,8 +17,10 @@ from spectral_core.standards import XYZ_to_Lab
 # With fewer levels there is no curve to show, only its end.
 _FEWEST_LEVELS = 3
 _EVEN_CODES = 201
+# Darker greys, over white's luminance, have the colour of black and of noise.
+DARK_GREY = 0.01
 # Arrows of the larger errors shall be about this long, in units of a*, b*.
-_ARROW = 15.0
+_ARROW = 30.0
 _MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 
 
@@ -45,6 +47,16 @@ class Ramp:
     even_codes: Float64Array
     curves: dict[str, Float64Array]
     residual_percent: dict[str, Float64Array]
+
+    @property
+    def darkest(self) -> float:
+        """The smallest luminance read that is not 0."""
+        return min(float(self.luminance.min()), self.black or np.inf)
+
+    @property
+    def largest_residual(self) -> float:
+        """Of any model, in percent, without sign."""
+        return max(float(np.abs(each).max()) for each in self.residual_percent.values())
 
 
 @dataclass(frozen=True)
@@ -119,6 +131,13 @@ def _ramp(found: Characterisation, name: str, direction: Float64Array, mask: np.
         {key: values[1:] for key, values in curves.items()},
         {key: 100 * (values / luminance - 1) for key, values in modelled.items()},
     )
+
+
+def visible_greys(measured: Measurements) -> Measurements:
+    """The greys of at least `DARK_GREY`, in rising order."""
+    bright = measured.grey & (measured.XYZ[:, 1] >= DARK_GREY * measured.white_XYZ[1]) & (measured.XYZ > 0).all(axis=1)
+    order = np.argsort(measured.codes.mean(axis=1), kind="stable")
+    return measured.subset(order[bright[order]])
 
 
 def primaries_XYZ(measured: Measurements) -> Float64Array:

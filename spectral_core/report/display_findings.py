@@ -26,7 +26,7 @@ def why_chosen(found: Characterisation) -> str:
     chosen = found.chosen
     if chosen.held_out is None:
         mixed = count(int(found.measured.mixed.sum()), "mixed colour")
-        return f"{chosen.name} was not chosen by a test, as there {'is' if mixed[0:2] == '1 ' else 'are'} {mixed}."
+        return f"{chosen.name} was not chosen by a test: {mixed} cannot decide."
     best = min(found.models, key=lambda each: float(each.held_out_errors.mean()))
     if chosen is not simplest_within_noise(found.models):
         return f"{chosen.name} was asked for. {best.name} has the smallest mean; {_apart(chosen, best)}."
@@ -39,7 +39,7 @@ def why_chosen(found: Characterisation) -> str:
     if not simpler:
         return f"{chosen.name} is the simplest model and has the smallest mean."
     rival = min(simpler, key=lambda each: float(each.held_out_errors.mean()))
-    return f"{chosen.name} has the smallest mean; {_apart(rival, chosen)}, and is the best of the simpler ones."
+    return f"{chosen.name} has the smallest mean. Of the simpler ones the best, {_apart(rival, chosen)}."
 
 
 def _apart(worse: ModelResult, better: ModelResult) -> str:
@@ -50,37 +50,39 @@ def _apart(worse: ModelResult, better: ModelResult) -> str:
 
 def what_is_missing(found: Characterisation, read: Measurements) -> list[Missing]:
     """What was not measured, the most important first."""
-    missing = []
-    if not found.models[0].held_out:
-        missing.append(
-            Missing(
-                f"{count(int(read.mixed.sum()), 'mixed colour')}",
-                "No model could be tested, so its error on colours is unknown; the model stated is a guess.",
-                f"{FOLDS * 10} colours in which two or three channels differ",
-            )
-        )
-    if any(r2 == 0.0 for _, r2 in found.gamma.values()):
-        missing.append(
-            Missing(
-                "ramps of the channels",
-                "The tone curves are assumed: gamma 2.2 where no grey ramp tells.",
-                "at least four levels of each channel and five greys",
-            )
-        )
-    if read.at(0, 0, 0) is None:
-        missing.append(
-            Missing("black", "It is taken as 0: contrast is unknown and dark colours are predicted too dark.", "codes 0 0 0")
-        )  # fmt: skip
-    if found.checks.noise_dE00 is None:
-        missing.append(
-            Missing("repeats", "The instrument's noise is unknown, so the errors cannot be set against it.",
-                    "white, black and some colours twice or more")
-        )  # fmt: skip
-    if read.unit != "cd/m2":
-        missing.append(
-            Missing("absolute luminance", "The file is relative to white; contrast and colour do not need it.",
-                    "white in cd/m²")
-        )  # fmt: skip
+    candidates = [
+        (
+            found.chosen.held_out is None,
+            f"enough mixed colours ({int(read.mixed.sum())})",
+            "No model could be tested, so its error on colours is unknown; the model stated is a guess.",
+            f"{FOLDS * 10} colours in which two or three channels differ",
+        ),
+        (
+            any(r2 == 0.0 for _, r2 in found.gamma.values()),
+            "ramps of the channels",
+            "The tone curves are assumed: gamma 2.2 where no grey ramp tells.",
+            "at least four levels of each channel and five greys",
+        ),
+        (
+            read.at(0, 0, 0) is None,
+            "black",
+            "It is taken as 0: contrast is unknown and dark colours are predicted too dark.",
+            "codes 0 0 0",
+        ),
+        (
+            found.checks.noise_dE00 is None,
+            "repeats",
+            "The instrument's noise is unknown, so the errors cannot be set against it.",
+            "white, black and some colours twice or more",
+        ),
+        (
+            read.unit != "cd/m2",
+            "absolute luminance",
+            "The file is relative to white; contrast and colour do not need it.",
+            "white in cd/m²",
+        ),
+    ]
+    missing = [Missing(*words) for absent, *words in candidates if absent]
     tried = {each.name for each in found.models}
     missing += [_unsupported(kind, found.measured) for kind in MODEL_KINDS if kind.name not in tried]
     return missing

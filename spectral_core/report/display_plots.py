@@ -17,6 +17,7 @@ from spectral_core.report.diagram import CIE_1976, background, daylight_xy, plan
 from spectral_core.report.display_data import HeldOut, Ramp, primaries_XYZ
 from spectral_core.report.extras import extra
 from spectral_core.report.figures import GRID, INK, MUTED, SERIES_COLOURS, new_figure, plain_ticks, style, svg_uri
+from spectral_core.report.numerals import percent
 
 # Okabe and Ito's colours; the dashes tell the gamuts apart without them.
 _GAMUT_LINES = {"sRGB": ("#d55e00", "-"), "P3": ("#009e73", (0, (6, 2))), "Rec.2020": ("#0072b2", (0, (1, 1.2)))}
@@ -25,7 +26,7 @@ _DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _LABELLED_K = (4000, 5000, 5500, 6000, 6500, 7500, 9300, 15000)
 # Residuals are linear up to this many percent and logarithmic beyond, so that dark readings fit in.
 _LINEAR_PERCENT = 2.0
-_DARKEST = 1e-5
+_RESIDUAL_LIMITS = (2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 
 def gamut_plot(eyes: Mapping[str, Measurements]) -> str:
@@ -91,45 +92,50 @@ def ramp_plot(ramps: Sequence[Ramp], models: Sequence[str], chosen: str) -> str:
             linear.set_title(ramp.name, fontsize=10)
             for name in models:
                 for axes in (linear, logarithmic):
-                    axes.plot(ramp.even_codes, np.maximum(ramp.curves[name], _DARKEST), **lines[name])
-                residual.plot(ramp.codes, ramp.residual_percent[name], **lines[name], marker="o", markersize=2)
+                    axes.plot(ramp.even_codes, ramp.curves[name], **lines[name])
+                residual.plot(ramp.codes, ramp.residual_percent[name], **lines[name])
             for axes in (linear, logarithmic):
-                axes.plot(ramp.codes, ramp.luminance, "o", color=INK, markersize=3, fillstyle="none", zorder=6)
-            logarithmic.axhline(max(ramp.black, _DARKEST), color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
+                axes.plot(
+                    ramp.codes, ramp.luminance, "o", color=INK, markersize=3.2, markerfacecolor="white", zorder=3.5
+                )
+            if ramp.black > 0:
+                logarithmic.axhline(ramp.black, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
             residual.axhline(0, color=MUTED, linewidth=0.8)
             for axes in (linear, logarithmic, residual):
                 axes.grid(color=GRID, linewidth=0.6)
                 axes.set_axisbelow(True)
                 axes.set_xlabel("code")
-        _ramp_scales(rows)
+        _ramp_scales(rows, min(ramp.darkest for ramp in ramps), max(ramp.largest_residual for ramp in ramps))
         handles = [extra("matplotlib.lines").Line2D([], [], **lines[name], label=name) for name in models]
         figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize=8.5)
     return svg_uri(figure)
 
 
-def _ramp_scales(rows: Any) -> None:
+def _ramp_scales(rows: Any, darkest: float, largest_residual: float) -> None:
     ticker = extra("matplotlib.ticker")
     for logarithmic in rows[1]:
-        logarithmic.set(xscale="log", yscale="log")
+        logarithmic.set(xscale="log", yscale="log", ylim=(darkest / 3, 2))
         plain_ticks(logarithmic.xaxis)
         logarithmic.yaxis.set_minor_formatter(ticker.NullFormatter())
     for residual in rows[2]:
         residual.set_yscale("symlog", linthresh=_LINEAR_PERCENT, linscale=1.5)
-        residual.yaxis.set_major_locator(ticker.FixedLocator([-100, -10, -2, -1, 0, 1, 2, 10, 100]))
+        limit = next((each for each in _RESIDUAL_LIMITS if each > largest_residual), 1.2 * largest_residual)
+        residual.set_ylim(-limit, limit)
+        residual.yaxis.set_major_locator(ticker.FixedLocator([-100, -10, -1, 0, 1, 10, 100]))
         residual.yaxis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:+g}" if value else "0"))
         residual.yaxis.set_minor_locator(ticker.NullLocator())
     for row in (0, 1):
         rows[row][0].set_ylabel("Y over Y at full drive")
-    rows[2][0].set_ylabel("model − measured, % of measured")
+    rows[2][0].set_ylabel("residual, % of measured")
 
 
 def _model_lines(models: Sequence[str], chosen: str) -> dict[str, dict[str, Any]]:
     """Line properties by model: the chosen one thick and on top."""
-    looks = zip(models, cycle(SERIES_COLOURS[:6]), [dash for dash in _DASHES for _ in range(6)], strict=False)
+    looks = zip(models, cycle(SERIES_COLOURS[:7]), [dash for dash in _DASHES for _ in range(7)], strict=False)
     return {
         name: {"color": INK, "linewidth": 1.8, "zorder": 4}
         if name == chosen
-        else {"color": colour, "linestyle": dash, "linewidth": 1.0, "zorder": 3}
+        else {"color": colour, "linestyle": dash, "linewidth": 0.9, "zorder": 3}
         for name, colour, dash in looks
     }
 
@@ -143,9 +149,10 @@ def grey_plot(greys: Mapping[str, Measurements], found: Mapping[str, Characteris
             white, model = found[name].measured.white_XYZ, found[name].chosen.model
             codes = grey.codes[:, 0]
             uv, modelled = _uv(grey.XYZ) - _uv(white), _uv(model.forward(grey.codes)) - _uv(white)
-            known = grey_cct(grey.XYZ)
-            left.plot(codes, known, marker, color=colour, markersize=3.5, fillstyle="none", label=f"{name}, measured")
-            left.plot(codes, grey_cct(model.forward(grey.codes)), color=colour, linewidth=1.1, label=f"{name}, model")
+            left.plot(
+                codes, _cct(grey.XYZ), marker, color=colour, markersize=3.5, fillstyle="none", label=f"{name}, measured"
+            )
+            left.plot(codes, _cct(model.forward(grey.codes)), color=colour, linewidth=1.1, label=f"{name}, model")
             for axis, dash in ((0, "-"), (1, (0, (4, 2)))):
                 label = f"Δ{CIE_1976.labels[axis]}, {name}"
                 right.plot(codes, uv[:, axis], "^v"[axis], color=colour, markersize=3.5, fillstyle="none")
@@ -159,7 +166,7 @@ def grey_plot(greys: Mapping[str, Measurements], found: Mapping[str, Characteris
     return svg_uri(figure)
 
 
-def grey_cct(XYZ: Float64Array) -> Float64Array:
+def _cct(XYZ: Float64Array) -> Float64Array:
     """CCT (n,) in kelvin of greys (n, 3); NaN, which plots leave out, where there is none (Duv beyond 0.05)."""
     found = [standards.cct_and_duv(XYZ_to_xy(each)) for each in XYZ]
     return np.array([cct if abs(duv) <= 0.05 else np.nan for cct, duv in found])
@@ -191,9 +198,17 @@ def error_plot(held: HeldOut) -> str:
             xlabel="a*", ylabel="b*", title=f"direction, {held.magnification:g} times enlarged",
             xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal",
         )  # fmt: skip
-        histogram.hist(held.dE00, bins=min(24, max(6, len(held.dE00) // 4)), color="#0072b2", alpha=0.75)
+        histogram.hist(
+            held.dE00,
+            bins=min(24, max(6, len(held.dE00) // 4)),
+            range=(0.0, held.dE00.max()),
+            color="#0072b2",
+            edgecolor="white",
+            linewidth=0.5,
+        )
         _marked(histogram, {"mean": held.dE00.mean(), "95 %": float(np.percentile(held.dE00, 95))})
         histogram.set(xlabel="dE00", ylabel="colours", title="histogram", xlim=(0, None))
+        histogram.yaxis.set_major_locator(extra("matplotlib.ticker").MaxNLocator(integer=True))
         for axes in (place, light, direction, histogram):
             axes.title.set_fontsize(10)
             axes.grid(color=GRID, linewidth=0.6)
@@ -226,8 +241,9 @@ def additivity_plot(measured: Measurements) -> str:
                 axes.text(middle, row, f"{share[row]:.1f}", ha="center", va="center", color="white", fontsize=8)
             start = start + share
         for row in range(3):
-            axes.text(max(start[row], 100) + 1.5, row, f"{start[row] - 100:+.1f} %", va="center", fontsize=9)
-        axes.axvline(100, color=INK, linewidth=1.4)
+            axes.text(max(start[row], 100) + 1.5, row, percent(start[row] / 100 - 1, 1, True), va="center", fontsize=9)
+        # Behind the bars: between them it is seen, and no number is struck through.
+        axes.axvline(100, color=INK, linewidth=1.4, zorder=0)
         axes.set(yticks=range(3), ylim=(2.6, -0.6), xlim=(0, max(start.max(), 100) + 16), xlabel="% of white")
         axes.set_yticklabels(("X", "Y", "Z"))
         axes.tick_params(axis="y", length=0)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -79,7 +80,7 @@ def primaries_table(found: Characterisation, measured: Measurements) -> Table:
         # R² 0 says that there was no ramp and the gamma is assumed.
         rows.append(Row((name, *cells, *((fixed(gamma, 3), fixed(r2, 5)) if r2 else (NONE, NONE)))))
     return Table(
-        f"As measured, black included. Y in {_UNITS.get(measured.unit, 'percent of white, as the file has it')}. "
+        f"As measured, black included. Y in {_UNITS.get(measured.unit, "the file's relative unit")}. "
         "Gamma: exponent of the channel's ramp by regression through full drive, black subtracted, and the share of "
         "variance that it explains; a dash where no ramp was measured.",
         ("", "x", "y", "u′", "v′", "Y", "Y / white", "gamma", "R²"),
@@ -114,7 +115,7 @@ def _model_row(result: ModelResult, chosen: bool) -> Row:
         fixed(result.fit.mean, 3),
         fixed(result.fit.max, 3),
         f"{result.nanoseconds:,.0f}".replace(",", " "),
-        f"{_numbers(result.model.to_json()):,}".replace(",", " "),
+        f"{_numbers(result.model):,}".replace(",", " "),
     )
     return Row(cells, strong=chosen)
 
@@ -125,12 +126,12 @@ def standard_error(values: Float64Array) -> float | None:
 
 
 def _numbers(value: Any) -> int:
-    """How many numbers a model's JSON holds."""
-    if isinstance(value, Mapping):
-        return sum(_numbers(each) for each in value.values())
-    if isinstance(value, list):
+    """How many numbers a model holds, those of its curves and of its base included."""
+    if is_dataclass(value):
+        return sum(_numbers(getattr(value, each.name)) for each in fields(value))
+    if isinstance(value, tuple):
         return sum(_numbers(each) for each in value)
-    return int(isinstance(value, (int, float)))
+    return int(np.size(value))
 
 
 def worst_table(held: HeldOut) -> Table:
@@ -161,36 +162,33 @@ def eyes_table(
     """Both eyes side by side with their differences."""
     whites = [each.white_XYZ for each in read]
     ratio = difference.luminance_ratio
-    chroma = [xy_to_uv(XYZ_to_xy(white)) for white in whites]
+    places = np.array([xy_to_uv(XYZ_to_xy(white)) for white in whites])
+    gammas = [[value if r2 else None for value, r2 in each.gamma.values()] for each in found]
+    held = [each.chosen.held_out for each in found]
+    shared = (difference.right_for_left, difference.left_for_right)
     rows = [
         Row(("white, Y", *(fixed(white[1], 2) for white in whites), percent(ratio - 1, 1, True) if ratio else NONE)),
-        *(
-            Row((f"white, {label}", *(fixed(each[axis], 4) for each in chroma), fixed(chroma[1][axis] - chroma[0][axis], 4)))
-            for axis, label in enumerate(("u′", "v′"))
-        ),
-        *(_gamma_row(channel, found) for channel in "RGB"),
-        Row(("additivity", *(percent(each.checks.additivity_error, 1, True) for each in found), _points(found, "additivity_error"))),
-        Row(("black, share of white", *(percent(each.checks.black_share, 3) for each in found), _points(found, "black_share", 3))),
+        _compared("white, u′", places[:, 0], 4),
+        _compared("white, v′", places[:, 1], 4),
+        *(_compared(f"gamma {channel}", pair, 3) for channel, *pair in zip("RGB", *gammas, strict=True)),
+        _compared("additivity, %", [100 * each.checks.additivity_error for each in found], 1),
+        _compared("black, % of white", [100 * each.checks.black_share for each in found], 3),
         Row(("chosen model", *(each.chosen.name for each in found), "")),
-        Row(("mean dE00, held out", *(fixed(each.chosen.held_out.mean if each.chosen.held_out else None, 3) for each in found), "")),
-        Row(("mean dE00 with the other eye's profile", fixed(difference.right_for_left.mean, 2), fixed(difference.left_for_right.mean, 2), "")),
-        Row(("95 %", fixed(difference.right_for_left.p95, 2), fixed(difference.left_for_right.p95, 2), ""), aside=True),
-        Row(("largest", fixed(difference.right_for_left.max, 2), fixed(difference.left_for_right.max, 2), ""), aside=True),
-    ]  # fmt: skip
+        Row(("mean dE00, held out", *(fixed(each.mean if each else None, 2) for each in held), "")),
+        Row(("mean dE00 with the other eye's profile", *(fixed(each.mean, 2) for each in shared), "")),
+        Row(("95 %", *(fixed(each.p95, 2) for each in shared), ""), aside=True),
+        Row(("largest", *(fixed(each.max, 2) for each in shared), ""), aside=True),
+    ]
     return Table(
-        "The two eyes, and the second less the first (the luminance of white: as a share of the first). The other eye's "
+        "The two eyes, and the second less the first (white's luminance: as a share of the first). The other eye's "
         "profile: dE00 of all patches, each eye's own white at Y = 1.",
         ("", *names, "difference"),
         tuple(rows),
     )
 
 
-def _gamma_row(channel: str, found: tuple[Characterisation, Characterisation]) -> Row:
-    known = [value if r2 else None for value, r2 in (each.gamma[channel] for each in found)]
-    left, right = known
-    apart = None if left is None or right is None else right - left
-    return Row((f"gamma {channel}", *(fixed(each, 3) for each in known), fixed(apart, 3)))
-
-
-def _points(found: tuple[Characterisation, Characterisation], name: str, decimals: int = 1) -> str:
-    return percent(getattr(found[1].checks, name) - getattr(found[0].checks, name), decimals, True)
+def _compared(label: str, pair: Sequence[float | None] | Float64Array, decimals: int) -> Row:
+    """A row of two numbers and the second less the first."""
+    first, second = pair
+    apart = None if first is None or second is None else second - first
+    return Row((label, *(fixed(each, decimals) for each in (first, second, apart))))
