@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -80,7 +80,7 @@ def primaries_table(found: Characterisation, measured: Measurements) -> Table:
         # R² 0 says that there was no ramp and the gamma is assumed.
         rows.append(Row((name, *cells, *((fixed(gamma, 3), fixed(r2, 5)) if r2 else (NONE, NONE)))))
     return Table(
-        f"As measured, black included. Y in {_UNITS.get(measured.unit, "the file's relative unit")}. "
+        f"As measured, black included. Y in {_UNITS.get(measured.unit, 'relative units of the file')}. "
         "Gamma: exponent of the channel's ramp by regression through full drive, black subtracted, and the share of "
         "variance that it explains; a dash where no ramp was measured.",
         ("", "x", "y", "u′", "v′", "Y", "Y / white", "gamma", "R²"),
