@@ -26,6 +26,8 @@ _DASHES = ("-", (0, (5, 2)), (0, (1.5, 1.5)))
 _LABELLED_K = (4000, 5000, 5500, 6000, 6500, 7500, 9300, 15000)
 # Residuals are linear up to this many percent and logarithmic beyond, so that dark readings fit in.
 _LINEAR_PERCENT = 2.0
+# Dark for large errors, which shall be seen on white paper.
+_ERRORS = "viridis_r"
 _RESIDUAL_LIMITS = (2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0)
 
 
@@ -174,10 +176,11 @@ def _cct(XYZ: Float64Array) -> Float64Array:
 
 def error_plot(held: HeldOut) -> str:
     """Held-out dE00 over chromaticity and lightness, the direction of errors, and their histogram."""
-    figure = new_figure(9.6, 7.6)
+    figure = new_figure(9.6, 7.8)
+    figure.get_layout_engine().set(hspace=0.05, wspace=0.04)
     with style():
         (place, light), (direction, histogram) = figure.subplots(2, 2)
-        shading = {"c": held.dE00, "cmap": "viridis", "vmin": 0.0}
+        shading = {"c": held.dE00, "cmap": _ERRORS, "vmin": 0.0}
         place.plot(*held.triangle[[0, 1, 2, 0]].T, color=MUTED, linewidth=1.0)
         dots = place.scatter(*held.uv.T, s=26, edgecolors="white", linewidths=0.4, **shading)
         place.set(xlabel=CIE_1976.labels[0], ylabel=CIE_1976.labels[1], aspect="equal", title="over chromaticity")
@@ -188,7 +191,7 @@ def error_plot(held: HeldOut) -> str:
         direction.axhline(0, color=GRID, linewidth=0.8)
         direction.axvline(0, color=GRID, linewidth=0.8)
         direction.quiver(
-            *a_b.T, *(held.magnification * change).T, held.dE00, cmap="viridis", clim=(0, held.dE00.max()),
+            *a_b.T, *(held.magnification * change).T, held.dE00, cmap=_ERRORS, clim=(0, held.dE00.max()),
             angles="xy", scale_units="xy", scale=1, width=0.005, headwidth=3.5,
         )  # fmt: skip
         direction.plot(*a_b.T, ".", color=INK, markersize=2)
