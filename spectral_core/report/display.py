@@ -117,6 +117,7 @@ def _eye(eye: Eye) -> dict[str, Any]:
         "gamut_table": display_tables.gamut_table(found, read),
         "primaries_table": display_tables.primaries_table(found, read),
         "ramps": [each.name for each in curves],
+        "unlit": sum(each.unlit for each in curves),
         "ramp_plot": display_plots.ramp_plot(curves, names, found.chosen.name) if curves else None,
         "models_table": display_tables.models_table(found),
         "error_plot": display_plots.error_plot(held) if held else None,

@@ -31,7 +31,9 @@ class Ramp:
     Attributes
     ----------
     codes, luminance
-        (n,) of the measured patches, in rising order.
+        (n,) of the measured patches that give light, in rising order.
+    unlit
+        How many others there are above code 0: they read no light.
     black
         Luminance at codes 0.
     even_codes, curves
@@ -43,6 +45,7 @@ class Ramp:
     name: str
     codes: Float64Array
     luminance: Float64Array
+    unlit: int
     black: float
     even_codes: Float64Array
     curves: dict[str, Float64Array]
@@ -68,7 +71,7 @@ class HeldOut:
     codes, measured, predicted
         (n, 3); `measured` and `predicted` are CIELAB.
     uv, triangle
-        (n, 2) CIE 1976 chromaticities as measured, (3, 2) those of the primaries.
+        (n, 2) CIE 1976 chromaticities as measured, NaN where X, Y or Z is not above 0; (3, 2) those of the primaries.
     dE00
         (n,).
     """
@@ -81,6 +84,11 @@ class HeldOut:
     uv: Float64Array
     triangle: Float64Array
     dE00: Float64Array
+
+    @property
+    def unlit(self) -> int:
+        """How many have no chromaticity."""
+        return int(np.isnan(self.uv[:, 0]).sum())
 
     @property
     def change(self) -> Float64Array:
@@ -114,8 +122,9 @@ def ramps(found: Characterisation) -> list[Ramp]:
 def _ramp(found: Characterisation, name: str, direction: Float64Array, mask: np.ndarray) -> Ramp:  # type: ignore[type-arg]
     measured = found.measured.subset(mask)
     codes = measured.codes.max(axis=1)
-    # Black has no place on a logarithmic axis, and no residual in percent where it reads 0.
-    order = [index for index in np.argsort(codes, kind="stable") if codes[index] > 0 and measured.XYZ[index, 1] > 0]
+    # What reads 0 has no place on a logarithmic axis, and no residual in percent.
+    lit = (codes > 0) & (measured.XYZ[:, 1] > 0)
+    order = np.flatnonzero(lit)[np.argsort(codes[lit], kind="stable")]
     full = found.measured.at(*direction)
     assert full is not None  # checked when the file was read
     even = np.linspace(0, 1, _EVEN_CODES)
@@ -126,6 +135,7 @@ def _ramp(found: Characterisation, name: str, direction: Float64Array, mask: np.
         name,
         codes[order],
         luminance,
+        int((codes > 0).sum() - lit.sum()),
         float(found.measured.black_XYZ[1] / full[1]),
         even[1:],
         {key: values[1:] for key, values in curves.items()},
@@ -151,13 +161,14 @@ def held_out(found: Characterisation) -> HeldOut | None:
     if result.held_out is None:
         return None
     measured, white = found.held_out, found.measured.white_XYZ
+    lit = (measured.XYZ > 0).all(axis=1)
     return HeldOut(
         measured.codes,
         XYZ_to_Lab(measured.XYZ, white),
         XYZ_to_Lab(result.held_out_XYZ, white),
         measured.XYZ / white,
         result.held_out_XYZ / white,
-        xy_to_uv(XYZ_to_xy(measured.XYZ)),
+        np.where(lit[:, None], xy_to_uv(XYZ_to_xy(np.where(lit[:, None], measured.XYZ, white))), np.nan),
         xy_to_uv(XYZ_to_xy(primaries_XYZ(found.measured))),
         result.held_out_errors,
     )

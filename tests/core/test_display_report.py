@@ -182,6 +182,26 @@ def test_residuals_of_ramps_have_the_size_and_sign_they_say() -> None:
     assert grey.black == pytest.approx(displays.BLACK[1] / displays.additive(np.ones((1, 3)))[0, 1])
 
 
+def test_patches_that_read_no_light_are_counted(oled: Measurements) -> None:
+    """Dark codes of a coarse instrument: the three darkest greens, black and one mixed colour read 0."""
+    mixed = int(np.flatnonzero(oled.mixed)[0])
+    dark = (oled.channel(1) & (oled.codes[:, 1] < 0.06)) | (oled.codes.max(axis=1) == 0)
+    dark[mixed] = True
+    found = characterise(replace(oled, XYZ=frozen(np.where(dark[:, None], 0.0, oled.XYZ))), "channel-lut")
+    # Such a patch in the middle of the gamut is a bad reading: it is put back to see what would be drawn.
+    assert [each.unlit for each in ramps(found)] == [0, 3, 0, 0]
+    assert all(np.isfinite(each.residual_percent["channel-lut"]).all() for each in ramps(found))
+    kept = int(np.flatnonzero((found.measured.codes == found.held_out.codes[0]).all(axis=1))[0])
+    XYZ = found.measured.XYZ.copy()
+    XYZ[kept] = 0.0
+    held = held_out(replace(found, measured=replace(found.measured, XYZ=frozen(XYZ))))
+    assert held is not None
+    assert held.unlit == 1
+    assert np.isnan(held.uv[0]).all()
+    assert np.isfinite(held.uv[1:]).all()
+    assert np.isfinite(held.measured).all()
+
+
 def test_arrows_are_enlarged_to_be_seen_and_not_to_run_off(oled_found: Characterisation) -> None:
     held = held_out(oled_found)
     assert held is not None
