@@ -11,8 +11,8 @@ from typing import Any
 import spectral_core
 from spectral_core.display.characterise import Characterisation
 from spectral_core.display.checks import ADDITIVE
+from spectral_core.display.coverage import XYZ_to_xy, xy_to_uv
 from spectral_core.display.eyes import eye_difference
-from spectral_core.display.gamut import XYZ_to_xy, xy_to_uv
 from spectral_core.display.measurements import Measurements
 from spectral_core.report import display_findings, display_plots, display_tables
 from spectral_core.report.display_data import DARK_GREY, held_out, ramps, visible_greys

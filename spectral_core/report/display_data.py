@@ -9,8 +9,8 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array
 from spectral_core.display.characterise import Characterisation
+from spectral_core.display.coverage import XYZ_to_xy, xy_to_uv
 from spectral_core.display.fitting import primaries
-from spectral_core.display.gamut import XYZ_to_xy, xy_to_uv
 from spectral_core.display.measurements import Measurements
 from spectral_core.standards import XYZ_to_Lab
 

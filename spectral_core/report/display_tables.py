@@ -12,8 +12,7 @@ from spectral_core import standards
 from spectral_core.arrays import Float64Array
 from spectral_core.display import srgb
 from spectral_core.display.characterise import Characterisation, ModelResult
-from spectral_core.display.eyes import EyeDifference
-from spectral_core.display.gamut import (
+from spectral_core.display.coverage import (
     Coverage,
     XYZ_to_xy,
     coverage,
@@ -22,6 +21,7 @@ from spectral_core.display.gamut import (
     volume,
     xy_to_uv,
 )
+from spectral_core.display.eyes import EyeDifference
 from spectral_core.display.measurements import Measurements
 from spectral_core.report.display_data import HeldOut, primaries_XYZ, worst
 from spectral_core.report.numerals import NONE, fixed, percent

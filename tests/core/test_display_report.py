@@ -17,8 +17,7 @@ from test_report import Reader
 from spectral_core import standards
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.display.characterise import Characterisation, characterise
-from spectral_core.display.eyes import eye_difference
-from spectral_core.display.gamut import (
+from spectral_core.display.coverage import (
     XYZ_to_xy,
     area,
     coverage,
@@ -28,6 +27,7 @@ from spectral_core.display.gamut import (
     volume,
     xy_to_uv,
 )
+from spectral_core.display.eyes import eye_difference
 from spectral_core.display.measurements import Measurements
 from spectral_core.display.models import GammaMatrix
 from spectral_core.report.display_data import held_out, ramps
