@@ -25,6 +25,8 @@ OBSERVERS = {
     "cie2015-10": "CIE 2015 10 Degree Standard Observer",
 }
 DEFAULT_OBSERVER = "cie1931-2"
+# Colour spaces that displays are compared with, all with a D65 white, by colour-science's names.
+GAMUTS = {"sRGB": "sRGB", "P3": "Display P3", "Rec.2020": "ITU-R BT.2020"}
 
 
 @cache
@@ -98,13 +100,18 @@ def _tables(sds: Any) -> dict[str, tuple[Float64Array, Float64Array]]:
     return {name: (frozen(sds[name].wavelengths), frozen(sds[name].values)) for name in list(sds)}
 
 
-@cache
 def srgb_to_XYZ_matrix() -> Float64Array:
-    """Linear sRGB (Rec.709 primaries, D65) to XYZ with white Y = 1: (3, 3), IEC 61966-2-1.
+    """Linear sRGB (Rec.709 primaries, D65) to XYZ with white Y = 1: (3, 3), IEC 61966-2-1."""
+    return rgb_to_XYZ_matrix("sRGB")
+
+
+@cache
+def rgb_to_XYZ_matrix(gamut: str) -> Float64Array:
+    """Linear RGB of one of `GAMUTS` to XYZ with white Y = 1: (3, 3).
 
     Derived from the primaries rather than taken rounded, so that its inverse is exact.
     """
-    space = _colour().RGB_COLOURSPACES["sRGB"]
+    space = _colour().RGB_COLOURSPACES[GAMUTS[gamut]]
     return frozen(_colour().normalised_primary_matrix(space.primaries, space.whitepoint))
 
 

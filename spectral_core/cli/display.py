@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import csv
 import io
+import shlex
 import sys
+from dataclasses import asdict, replace
+from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -12,17 +15,20 @@ import click
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.cli.console import emit, rounded, table
+from spectral_core.cli.console import Document, emit, rounded, table
 from spectral_core.cli.options import as_json, observer_option, profile_option
 from spectral_core.cli.profile import make_profile, profile_warnings, state_options
 from spectral_core.display import load_profile, write_profile
 from spectral_core.display.characterise import characterise as choose
+from spectral_core.display.eyes import eye_difference
 from spectral_core.display.fitting import MODEL_KINDS
 from spectral_core.display.gamut import GAMUT_RULES, GamutCounts, map_to_gamut
 from spectral_core.display.measurements import read_measurements
 from spectral_core.documents import characterise_document
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
+from spectral_core.report.display import DisplayReport, Eye, write_display_report
+from spectral_core.standards import DEFAULT_OBSERVER
 
 _PATH = click.Path(path_type=Path)
 _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
@@ -35,16 +41,27 @@ _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
     "--model", type=click.Choice([kind.name for kind in MODEL_KINDS]), help="use this one instead of the best"
 )
 @state_options
+@click.option("--report", type=_PATH, help="write an HTML report there")
+@click.option(
+    "--right", type=_PATH, metavar="FILE", help="the right eye, FILE is then the left: both go into the report"
+)
 @observer_option
 @as_json
-def characterise(file: Path, output: Path | None, model: str | None, observer: str, json: bool, **given: Any) -> None:
+def characterise(
+    file: Path, output: Path | None, model: str | None, report: Path | None, right: Path | None, observer: str,
+    json: bool, **given: Any,
+) -> None:  # fmt: skip
     """Choose a model for a display measured in FILE, by its error on colours held out.
 
     FILE is Argyll's .ti3, or CSV: R,G,B,X,Y,Z or R,G,B,x,y,Y or rows Red, Green, Blue, White, Black.
     """
+    if right is not None and report is None:
+        raise DisplayError("--right is for a report of both eyes", remedy="give --report FILE.html as well")
     measured = read_measurements(file, observer)
     found = choose(measured, model)
     document = characterise_document(found, measured)
+    if report is not None:
+        document |= _write_report(report, Eye("display", file.name, measured, found), right, model, observer)
     if output is not None:
         source = f"characterised from {file.name}, {len(found.measured.codes)} patches, {measured.instrument}".rstrip(
             ", "
@@ -91,6 +108,24 @@ def convert(profile: str, target: str, gamut: Any, keep: bool, file: Path | None
     writer = csv.writer(sys.stdout, lineterminator="\n")
     writer.writerow(_HEADERS["codes" if target == "xyz" else "xyz"])
     writer.writerows([f"{value:.9g}" for value in row] for row in result)
+
+
+def _write_report(report: Path, eye: Eye, right: Path | None, model: str | None, observer: str) -> Document:
+    """Write the report of a display, or of both eyes, and return what the document says of it."""
+    options = {"--model": model, "--observer": observer if observer != DEFAULT_OBSERVER else None}
+    options |= {"--right": right.name if right else None, "--report": report.name}
+    given = [part for option, value in options.items() if value for part in (option, value)]
+    document: Document = {"report": str(report)}
+    eyes = [eye]
+    if right is not None:
+        measured = read_measurements(right, observer)
+        found = choose(measured, model)
+        eyes = [replace(eye, name="left eye"), Eye("right eye", right.name, measured, found)]
+        difference = eye_difference(eye.found, found, eye.read, measured)
+        document |= {"right": characterise_document(found, measured), "eyes": asdict(difference)}
+    command = shlex.join(["spectral-booth", "characterise", eye.file, *given])
+    write_display_report(report, DisplayReport(eyes, command, date.today()))
+    return document
 
 
 def add_display_commands(group: click.Group) -> None:

@@ -28,13 +28,15 @@ _BAD_RATIO, _BAD_DE00 = 12.0, 2.0
 class ModelResult:
     """A model on trial: dE00 on held-out mixed colours (None if too few) and on what it was fitted to.
 
-    `nanoseconds` is what a pixel costs from codes to XYZ and back.
+    `held_out_errors` (m,) and the predictions `held_out_XYZ` (m, 3) are in the order of
+    `Characterisation.held_out`. `nanoseconds` is what a pixel costs from codes to XYZ and back.
     """
 
     name: str
     model: DisplayModel
     held_out: Percentiles | None
     held_out_errors: Float64Array
+    held_out_XYZ: Float64Array
     fit: Percentiles
     nanoseconds: float
 
@@ -49,6 +51,11 @@ class Characterisation:
     checks: Checks
     gamma: dict[str, tuple[float, float]]
     warnings: tuple[str, ...]
+
+    @property
+    def held_out(self) -> Measurements:
+        """The mixed colours that the models were judged by, each predicted by fits without it."""
+        return self.measured.subset(np.concatenate(folds(self.measured)))
 
 
 def characterise(measured: Measurements, wanted: str | None = None) -> Characterisation:
@@ -80,7 +87,7 @@ def characterise(measured: Measurements, wanted: str | None = None) -> Character
             f"{int(measured.mixed.sum())} mixed colours are too few to test a model; {FOLDS * 10} are enough"
         )
     results = tuple(_on_trial(measured, kind) for kind in kinds)
-    chosen = next((each for each in results if each.name == wanted), None) or _simplest_within_noise(results)
+    chosen = next((each for each in results if each.name == wanted), None) or simplest_within_noise(results)
     gamma = {
         name: gamma_fit(*ramp_drive(measured, index, measured.black_XYZ)) for index, name in enumerate(("R", "G", "B"))
     }
@@ -101,28 +108,45 @@ def errors(model: DisplayModel, measured: Measurements, white_XYZ: Float64Array)
     return delta_E_2000(XYZ_to_Lab(predicted, white_XYZ), XYZ_to_Lab(measured.XYZ, white_XYZ))
 
 
-def held_out_errors(measured: Measurements, kind: ModelKind) -> Float64Array:
-    """dE00 (mixed colours,) in the order of `folds`; empty if there are too few."""
+def held_out_XYZ(measured: Measurements, kind: ModelKind) -> Float64Array:
+    """XYZ (mixed colours, 3) predicted by fits without them, in the order of `folds`; empty if there are too few."""
     if measured.mixed.sum() < _FEWEST_MIXED:
-        return np.zeros(0)
+        return np.zeros((0, 3))
     found = []
     for test in folds(measured):
         kept = np.ones(len(measured.codes), dtype=bool)
         kept[test] = False
-        found.append(errors(kind.fit(measured.subset(kept)), measured.subset(test), measured.white_XYZ))
+        found.append(kind.fit(measured.subset(kept)).forward(measured.codes[test]))
     return np.concatenate(found)
+
+
+def held_out_errors(measured: Measurements, predicted: Float64Array) -> Float64Array:
+    """dE00 (mixed colours,) of what `held_out_XYZ` predicted."""
+    if not len(predicted):
+        return np.zeros(0)
+    truth = measured.XYZ[np.concatenate(folds(measured))]
+    white = measured.white_XYZ
+    return delta_E_2000(XYZ_to_Lab(predicted, white), XYZ_to_Lab(truth, white))
 
 
 def _on_trial(measured: Measurements, kind: ModelKind) -> ModelResult:
     model = kind.fit(measured)
-    outside = held_out_errors(measured, kind)
+    predicted = held_out_XYZ(measured, kind)
+    outside = held_out_errors(measured, predicted)
     inside = errors(model, measured, measured.white_XYZ)
     return ModelResult(
-        kind.name, model, percentiles(outside) if len(outside) else None, outside, percentiles(inside), _cost(model)
+        kind.name,
+        model,
+        percentiles(outside) if len(outside) else None,
+        outside,
+        predicted,
+        percentiles(inside),
+        _cost(model),
     )
 
 
-def _simplest_within_noise(results: tuple[ModelResult, ...]) -> ModelResult:
+def simplest_within_noise(results: tuple[ModelResult, ...]) -> ModelResult:
+    """The rule by which a model is chosen, see `characterise`; results go from the simplest on."""
     if results[0].held_out is None:
         # Nothing to choose by: the most that the data supports without a test is the plain model with black.
         return results[min(1, len(results) - 1)]
@@ -137,7 +161,7 @@ def _simplest_within_noise(results: tuple[ModelResult, ...]) -> ModelResult:
 def _without_bad_patches(measured: Measurements, kind: ModelKind) -> tuple[Measurements, list[str]]:
     if measured.mixed.sum() < _FEWEST_MIXED:
         return measured, []
-    outside = held_out_errors(measured, kind)
+    outside = held_out_errors(measured, held_out_XYZ(measured, kind))
     index = np.concatenate(folds(measured))
     bad = index[(outside > _BAD_RATIO * np.median(outside)) & (outside > _BAD_DE00)]
     if not len(bad) or len(bad) > 0.05 * len(measured.codes):

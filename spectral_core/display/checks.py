@@ -11,7 +11,7 @@ from spectral_core.display.measurements import SAME_CODE, Measurements
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 # Channels that sum to within this of white are additive as far as instruments tell (1 % in Y).
-_ADDITIVE = 0.02
+ADDITIVE = 0.02
 # A step down a ramp larger than this share of white is no noise.
 _RAMP_TOLERANCE = 2e-3
 
@@ -46,7 +46,7 @@ def check(measured: Measurements) -> Checks:
     total = np.sum([each for each in primaries if each is not None], axis=0) - 2 * black
     additivity = np.asarray(total / white - 1)
     warnings = list(measured.warnings)
-    if abs(additivity[1]) > _ADDITIVE:
+    if abs(additivity[1]) > ADDITIVE:
         warnings.append(f"not additive: red, green and blue sum to {additivity[1]:+.1%} of white's luminance")
     if measured.at(0, 0, 0) is None:
         warnings.append("black was not measured and is taken as 0")

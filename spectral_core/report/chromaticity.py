@@ -4,39 +4,17 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 import numpy as np
 
-from spectral_core import standards
-from spectral_core.arrays import Float64Array, frozen
-from spectral_core.display import srgb, srgb_encode
+from spectral_core.arrays import Float64Array
+from spectral_core.display import srgb
+from spectral_core.report.diagram import CIE_1931, background, daylight_xy, planckian_xy, wavelength_labels
 from spectral_core.report.figures import GRID, INK, MUTED, new_figure, style, svg_uri
 
 # Lights closer than this are one dot: at the size of the plot nobody could tell them apart.
 _ONE_DOT = 8e-4
-# Second radiation constant of Planck's law, ITS-90 as CIE 15 uses it, in nm K.
-_C2_NM_K = 1.4388e7
-_DIAGRAM = (0.0, 0.8, 0.0, 0.9)
-
-
-@cache
-def spectrum_locus() -> tuple[Float64Array, Float64Array]:
-    """Wavelengths (n,) in nm and xy (n, 2) of the spectral colours, CIE 1931, 380 to 700 nm."""
-    wavelengths, cmfs = standards.observer_table()
-    # Beyond 700 nm the chromaticity no longer changes; the table's last digits would make it wander.
-    known = (wavelengths >= 380) & (wavelengths <= 700)
-    return frozen(wavelengths[known]), frozen(cmfs[known, :2] / cmfs[known].sum(axis=1, keepdims=True))
-
-
-def planckian_xy(temperatures_K: Float64Array) -> Float64Array:
-    """Chromaticity (n, 2) of Planckian radiators (n,)."""
-    wavelengths, cmfs = standards.observer_table()
-    nm = wavelengths[:, None]
-    power = nm**-5.0 / np.expm1(_C2_NM_K / (nm * temperatures_K))
-    XYZ = power.T @ cmfs
-    return np.asarray(XYZ[:, :2] / XYZ.sum(axis=1, keepdims=True))
 
 
 def chromaticity_plot(lights: Mapping[str, Float64Array]) -> str:
@@ -47,18 +25,18 @@ def chromaticity_plot(lights: Mapping[str, Float64Array]) -> str:
         whole, near = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1, 1.12]})
         box = _surroundings(np.array([xy for _, xy in dots]))
         for axes in (whole, near):
-            _background(axes)
+            background(axes, CIE_1931)
             axes.grid(color=GRID, linewidth=0.5, alpha=0.7)
             axes.set_aspect("equal")
-            axes.set(xlabel="x", ylabel="y")
+            axes.set(xlabel=CIE_1931.labels[0], ylabel=CIE_1931.labels[1])
         _lines(whole, labelled=True)
         _lines(near, labelled=False)
-        whole.set(xlim=(-0.05, _DIAGRAM[1]), ylim=(-0.03, _DIAGRAM[3]))
+        whole.set(xlim=(-0.05, CIE_1931.extent[1]), ylim=(-0.03, CIE_1931.extent[3]))
         near.set(xlim=box[:2], ylim=box[2:])
         whole.plot(*zip(*(xy for _, xy in dots), strict=True), "o", color=INK, markersize=3, markeredgewidth=0)
         corners = ((0, 2), (1, 2), (1, 3), (0, 3), (0, 2))
         whole.plot(*zip(*((box[x], box[y]) for x, y in corners), strict=True), color=MUTED, linewidth=0.7)
-        _wavelength_labels(whole)
+        wavelength_labels(whole, CIE_1931)
         near.plot(
             *zip(*(xy for _, xy in dots), strict=True), "o", color=INK, markersize=5, markeredgecolor="white", zorder=5
         )
@@ -91,20 +69,6 @@ def _surroundings(xy: Float64Array) -> tuple[float, float, float, float]:
     )
 
 
-def _background(axes: Any) -> None:
-    """The diagram's colours, pale, inside the locus only."""
-    size = 256
-    x = np.linspace(_DIAGRAM[0], _DIAGRAM[1], size)
-    y = np.linspace(_DIAGRAM[2], _DIAGRAM[3], size)
-    grid = np.stack(np.broadcast_arrays(x[None, :], np.maximum(y[:, None], 1e-3)), axis=-1)
-    XYZ = np.stack([grid[..., 0], grid[..., 1], 1 - grid.sum(axis=-1)], axis=-1) / grid[..., 1:]
-    linear = np.maximum(srgb().to_linear(XYZ), 0)
-    rgb = srgb_encode(linear / linear.max(axis=-1, keepdims=True))
-    image = axes.imshow(0.45 + 0.55 * rgb, extent=_DIAGRAM, origin="lower", aspect="auto", interpolation="bilinear")
-    locus = axes.fill(*spectrum_locus()[1].T, facecolor="none", edgecolor=INK, linewidth=0.9)[0]
-    image.set_clip_path(locus)
-
-
 def _lines(axes: Any, labelled: bool) -> None:
     """The sRGB triangle, the Planckian locus and CIE daylight."""
     primaries = srgb().to_XYZ(np.eye(3))
@@ -113,24 +77,11 @@ def _lines(axes: Any, labelled: bool) -> None:
     (srgb_line,) = axes.plot(*triangle[[0, 1, 2, 0]].T, color=MUTED, linewidth=1.0)
     planck = planckian_xy(1e6 / np.linspace(40, 800, 150))
     (planck_line,) = axes.plot(*planck.T, color=INK, linewidth=1.0)
-    temperatures = 1e6 / np.linspace(40, 200, 40)
-    daylight = np.array([standards.planckian_or_daylight_xy(float(each)) for each in temperatures])
+    daylight = daylight_xy(1e6 / np.linspace(40, 200, 40))
     (daylight_line,) = axes.plot(*daylight.T, color=INK, linewidth=1.0, linestyle=(0, (3, 2)))
     if labelled:
         lines = (srgb_line, planck_line, daylight_line)
         axes.legend(lines, ("sRGB", "Planckian locus", "CIE daylight"), loc="upper right", frameon=False, fontsize=8)
-
-
-def _wavelength_labels(axes: Any) -> None:
-    wavelengths, locus = spectrum_locus()
-    white = np.array([1 / 3, 1 / 3])
-    for wavelength in (460, 480, 490, 500, 520, 540, 560, 580, 600, 620, 700):
-        place = locus[int(np.argmin(np.abs(wavelengths - wavelength)))]
-        away = (place - white) / np.hypot(*(place - white))
-        axes.plot(*place, "o", color=INK, markersize=2)
-        axes.annotate(
-            f"{wavelength}", place, 11 * away, textcoords="offset points", fontsize=7, ha="center", va="center"
-        )
 
 
 def _place_labels(figure: Any, axes: Any, dots: list[tuple[str, Float64Array]]) -> None:

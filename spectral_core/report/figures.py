@@ -15,6 +15,7 @@ GRID = "#e4e7eb"
 LEVEL_COLOURS = {0: "#9aa1ab", 1: "#d55e00", 2: "#0072b2"}
 LEVEL_MARKERS = {0: "o", 1: "s", 2: "D"}
 LEVEL_NAMES = {0: "level 0, unmanaged", 1: "level 1, lamps", 2: "level 2, spectral"}
+SERIES_COLOURS = ("#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#d55e00", "#0072b2", "#8a919c", "#2b3038")
 _STYLE = {
     # Outlines instead of text: labels keep their places whatever fonts the reader has.
     "svg.fonttype": "path",
@@ -46,6 +47,13 @@ def new_figure(width_in: float, height_in: float, layout: str = "constrained") -
 def style() -> Any:
     """The report's style as a context; axes take it when they are made, SVG when it is written."""
     return extra("matplotlib").rc_context(_STYLE)
+
+
+def plain_ticks(axis: Any) -> None:
+    """Tick labels 0.01, 0.1, 1, 10 rather than powers."""
+    ticker = extra("matplotlib.ticker")
+    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(ticker.NullFormatter())
 
 
 def svg_uri(figure: Any) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from importlib import resources
 from pathlib import Path, PureWindowsPath
 from typing import Any
 
@@ -12,13 +11,13 @@ import numpy as np
 
 from spectral_core.baking import file_name
 from spectral_core.errors import OutputError
-from spectral_core.files import atomic_path
 from spectral_core.lights import Light, LightQuality
-from spectral_core.report import findings, numerals, tables
+from spectral_core.report import findings, tables
 from spectral_core.report.chromaticity import chromaticity_plot
 from spectral_core.report.documents import Document
 from spectral_core.report.embedding import image_uri
 from spectral_core.report.extras import extra
+from spectral_core.report.pages import write_page
 from spectral_core.report.plots import ErrorPoint, PatchError, level_plot, patch_map, spd_plot, time_plot
 from spectral_core.report.published import published_lights
 from spectral_core.scene import resolve_light
@@ -112,23 +111,10 @@ def write_report(path: Path, report: ReportInput) -> None:
     LightError, SpectrumError
         If a light of the documents cannot be found any more.
     """
-    jinja2 = extra("jinja2")
-    extra("matplotlib")
     extra("PIL.Image")
     if not report.runs:
         raise OutputError("no light was verified", where=path, remedy="give the result of `verify` for a scene")
-    package = resources.files("spectral_core.report")
-    environment = jinja2.Environment(
-        loader=jinja2.FunctionLoader(lambda name: package.joinpath(name).read_text(encoding="utf-8")),
-        autoescape=True,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        undefined=jinja2.StrictUndefined,
-    )
-    environment.filters.update(fixed=numerals.fixed, small=numerals.small)
-    text = environment.get_template("report.html").render(_context(report))
-    with atomic_path(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+    write_page(path, "report.html", _context(report))
 
 
 def _context(report: ReportInput) -> dict[str, Any]:
@@ -138,7 +124,6 @@ def _context(report: ReportInput) -> dict[str, Any]:
     strips = _strips(report, qualities)
     return {
         "title": report.title,
-        "css": resources.files("spectral_core.report").joinpath("report.css").read_text(encoding="utf-8"),
         "runs": [_run(run, run is report.chart) for run in report.runs],
         "light_names": list(lights),
         "booth_strips": strips.get("booth", []),
@@ -149,7 +134,6 @@ def _context(report: ReportInput) -> dict[str, Any]:
         "chromaticity": chromaticity_plot({name: light.xy() for name, light in lights.items()}),
         "colorchecker": tables.colorchecker_table() if report.chart else None,
         "kinds": findings.kinds_met([run.document for run in report.runs]),
-        "count": numerals.count,
     }
 
 

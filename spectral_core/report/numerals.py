@@ -16,6 +16,14 @@ def fixed(value: float | None, decimals: int) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
+def percent(fraction: float | None, decimals: int = 1, signed: bool = False) -> str:
+    """A fraction as ``99.8 %``; ``+0.3 %`` if signed."""
+    if fraction is None or not math.isfinite(fraction):
+        return NONE
+    text = fixed(100 * fraction, decimals)
+    return f"{'+' if signed and fraction >= 0 else ''}{text} %"
+
+
 def spread(mean: float, sd: float, decimals: int = 2) -> str:
     """Mean and standard deviation, ``3.33 ± 2.86``."""
     return f"{fixed(mean, decimals)} ± {fixed(sd, decimals)}"

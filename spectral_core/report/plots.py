@@ -23,6 +23,7 @@ from spectral_core.report.figures import (
     LEVEL_NAMES,
     MUTED,
     new_figure,
+    plain_ticks,
     style,
     svg_uri,
 )
@@ -127,7 +128,7 @@ def level_plot(points: Sequence[ErrorPoint]) -> str:
             axes.tick_params(axis="y", length=0)
             axes.spines["left"].set_visible(False)
             axes.set_axisbelow(True)
-            _plain_ticks(axes.xaxis)
+            plain_ticks(axes.xaxis)
         _level_legend(figure, sorted({point.level for point in points}))
     return svg_uri(figure)
 
@@ -163,8 +164,8 @@ def time_plot(points: Sequence[ErrorPoint]) -> str:
         )
         axes.grid(color=GRID, linewidth=0.6)
         axes.set_axisbelow(True)
-        _plain_ticks(axes.xaxis)
-        _plain_ticks(axes.yaxis)
+        plain_ticks(axes.xaxis)
+        plain_ticks(axes.yaxis)
         _level_legend(figure, sorted({point.level for point in points}))
     return svg_uri(figure)
 
@@ -214,13 +215,6 @@ def _range(axes: Any, level: int, y: float, mean: float, maximum: float) -> None
 def _reference(axes: Any, value: float, label: str) -> None:
     axes.axvline(value, color=MUTED, linewidth=0.8, linestyle=(0, (4, 3)))
     axes.annotate(label, (value, -0.72), (4, -1), textcoords="offset points", va="top", fontsize=7.5, color=MUTED)
-
-
-def _plain_ticks(axis: Any) -> None:
-    """Tick labels 0.01, 0.1, 1, 10 rather than powers."""
-    ticker = extra("matplotlib.ticker")
-    axis.set_major_formatter(ticker.FuncFormatter(lambda value, _: f"{value:g}"))
-    axis.set_minor_formatter(ticker.NullFormatter())
 
 
 def _nice_log_limits(axes: Any, values: Sequence[float]) -> None:

@@ -27,12 +27,18 @@ _ROUNDING = "8-bit rounding"
 
 @dataclass(frozen=True)
 class Row:
-    """A row of cells; `group` starts a new block, `aside` is set back (published figures)."""
+    """A row of cells; `group` starts a new block, `aside` is set back (published figures), `strong` stands out."""
 
     cells: tuple[str, ...]
     group: bool = False
     aside: bool = False
+    strong: bool = False
     swatches: tuple[str, ...] = ()
+
+    @property
+    def kind(self) -> str:
+        """Its class in the page's style sheet."""
+        return "aside" if self.aside else "strong" if self.strong else "group" if self.group else ""
 
 
 @dataclass(frozen=True)
