@@ -1,0 +1,222 @@
+"""An OpenColorIO config: Blender's own, with the headset as one more display.
+
+The new display's view ``Standard`` is colorimetric: what the scene's XYZ says is what the headset
+shows, and scene-linear Y = 1 is its white's luminance. The scene's white is not adapted to the
+headset's. Colours out of gamut are clipped channel by channel.
+
+The config is text that is edited, not parsed: comments and everything of Blender's stay as they were.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from spectral_core.arrays import Float64Array
+from spectral_core.display.export.luts import write_cube, write_spi1d
+from spectral_core.display.export.names import export_name
+from spectral_core.display.profile import DisplayProfile
+from spectral_core.display.stages import SHAPER, Interaction, Power, Stages, Tables, stages
+from spectral_core.errors import DisplayError, OutputError
+from spectral_core.files import atomic_path, is_file, read_text
+
+VIEW = "Standard"
+_MARK = "# Made by Spectral Booth from"
+_REMEDY = "give Blender's own config.ocio (in its folder datafiles/colormanagement)"
+_CURVE_NODES = 4096
+# Twice the nodes a side cost eight times the memory of a graphics card: 3.3 MB here.
+TABLE_NODES = 65
+
+
+@dataclass(frozen=True)
+class OcioExport:
+    """Where the config is, and what to choose in it."""
+
+    config: Path
+    display: str
+    view: str
+    files: tuple[Path, ...]
+
+
+def blender_config() -> Path:
+    """The config that the variable OCIO names, or that of the Blender in this Python, without importing it.
+
+    Raises
+    ------
+    DisplayError
+        If there is neither.
+    """
+    if is_file(named := Path(os.environ.get("OCIO", ""))):
+        return named
+    spec = importlib.util.find_spec("bpy")
+    for folder in (spec.submodule_search_locations or ()) if spec else ():
+        for found in Path(folder).glob("*/datafiles/colormanagement/config.ocio"):
+            return found
+    raise DisplayError("no OpenColorIO config of Blender was found", remedy=f"{_REMEDY} with --base")
+
+
+def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport:
+    """Write a self-contained copy of the config `base` to `folder`, with the profile as one more display.
+
+    Raises
+    ------
+    DisplayError
+        If `base` is not such a config.
+    OutputError
+        If `folder` holds something that is not from here.
+    """
+    text = read_text(base, DisplayError, _REMEDY)
+    config = folder / "config.ocio"
+    _refuse_foreign(folder, config)
+    paths = _search_path(text, base)
+    display = _free_name(export_name(profile), text)
+    steps = stages(profile.model)
+    files = [_copied(source, folder / path / source.name) for path in paths for source in _files(base.parent / path)]
+    luts, transforms = _written(steps, folder / paths[0], export_name(profile))
+    edited = _with_display(text, base, display, transforms)
+    with atomic_path(config) as temporary:
+        temporary.write_text(edited, encoding="utf-8")
+    return OcioExport(config, display, VIEW, (config, *luts, *files))
+
+
+def _refuse_foreign(folder: Path, config: Path) -> None:
+    """A folder that is there must be empty or hold a config from here."""
+    try:
+        inside = any(folder.iterdir()) if folder.is_dir() else folder.exists()
+    except OSError as error:
+        raise OutputError(f"cannot be read ({error.strerror})", where=folder, remedy="choose another folder") from None
+    if inside and not (is_file(config) and read_text(config, OutputError, "choose another folder").startswith(_MARK)):
+        raise OutputError("holds files that are not from here", where=folder, remedy="choose an empty or new folder")
+
+
+def _search_path(text: str, base: Path) -> list[str]:
+    found = re.search(r'^search_path:[ ]*"?([^"\n]+)"?[ ]*$', text, re.MULTILINE)
+    paths = [path for path in (found[1].split(":") if found else []) if path]
+    if not paths or any(Path(path).is_absolute() or ".." in Path(path).parts for path in paths):
+        raise DisplayError("has no folders of its own for tables (search_path)", where=base, remedy=_REMEDY)
+    return paths
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.is_file()) if folder.is_dir() else []
+
+
+def _copied(source: Path, target: Path) -> Path:
+    if source.resolve() != target.resolve():
+        with atomic_path(target) as temporary:
+            shutil.copyfile(source, temporary)
+    return target
+
+
+def _free_name(wanted: str, text: str) -> str:
+    """The name, told apart from every display, colour space, alias and role that the config has."""
+    taken = {word.strip(" \"'").casefold() for word in re.split(r"[,:\[\]\n{}]", text)}
+    name = wanted
+    while name.casefold() in taken:
+        name += " (profile)"
+    return name
+
+
+def _written(steps: Stages, folder: Path, name: str) -> tuple[list[Path], list[str]]:
+    """The tables (paths) that the steps need, and OCIO's transforms from XYZ of D65's scale to codes."""
+    files: list[Path] = []
+    transforms = [_matrix(steps.matrix, steps.offset)]
+    if isinstance(interaction := steps.interaction, Interaction):
+        low, high = interaction.span
+        scale = 1 / (high - low)
+        files.append(folder / f"{name} interaction.cube")
+        write_cube(files[-1], interaction.sampled(TABLE_NODES), (f"Own lightness of drive: {name}",))
+        # CIE 1976 lightness is this function with these numbers; mirrored, as the model's is.
+        transforms += [
+            "!<ExponentWithLinearTransform> {gamma: [3, 3, 3, 1], offset: [0.16, 0.16, 0.16, 0], style: mirror, "
+            "direction: inverse}",
+            _matrix(np.diag(scale), -low * scale),
+            _file(files[-1], "tetrahedral"),
+        ]
+    transforms.append(_CLAMP)
+    if isinstance(curve := steps.curve, Tables):
+        files.append(folder / f"{name} curves.spi1d")
+        write_spi1d(files[-1], curve.sampled(_CURVE_NODES))
+        transforms += [_power(np.full(3, 1 / SHAPER)), _file(files[-1], "linear")]
+    elif isinstance(curve, Power):
+        transforms.append(_power(curve.gamma))
+        if curve.threshold.any():
+            transforms += [_matrix(np.diag(1 - curve.threshold), curve.threshold), _CLAMP]
+    else:
+        transforms.append("!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, direction: inverse}")
+    return files, transforms
+
+
+_CLAMP = "!<RangeTransform> {min_in_value: 0, max_in_value: 1, min_out_value: 0, max_out_value: 1}"
+
+
+def _matrix(matrix: Float64Array, offset: Float64Array) -> str:
+    full = np.eye(4)
+    full[:3, :3] = matrix
+    numbers = ", ".join(f"{value:.12g}" for value in full.ravel())
+    offsets = ", ".join(f"{value:.12g}" for value in (*offset, 0.0))
+    return f"!<MatrixTransform> {{matrix: [{numbers}], offset: [{offsets}]}}"
+
+
+def _power(gamma: Float64Array) -> str:
+    numbers = ", ".join(f"{value:.12g}" for value in gamma)
+    return f"!<ExponentTransform> {{value: [{numbers}, 1], direction: inverse}}"
+
+
+def _file(path: Path, interpolation: str) -> str:
+    return f'!<FileTransform> {{src: "{path.name}", interpolation: {interpolation}}}'
+
+
+def _with_display(text: str, base: Path, display: str, transforms: list[str]) -> str:
+    """The config's text with a display of its own colour space, from the scene's reference space on."""
+    for role in ("reference", "cie_xyz_d65_interchange"):
+        if not re.search(rf"^  {role}:", text, re.MULTILINE):
+            raise DisplayError(f"has no role '{role}'", where=base, remedy=_REMEDY)
+    views = [f"{{name: {VIEW}, colorspace: {_quoted(display)}}}", "{name: Raw, colorspace: Non-Color}"]
+    shown = [f"  {_quoted(display)}:", *(f"    - !<View> {view}" for view in views)]
+    space = [
+        "  - !<ColorSpace>",
+        f"    name: {_quoted(display)}",
+        "    family: Display",
+        "    bitdepth: 32f",
+        "    description: Device codes of a measured display, colorimetric, clipped",
+        "    isdata: false",
+        "    from_scene_reference: !<GroupTransform>",
+        "      children:",
+        "        - !<ColorSpaceTransform> {src: reference, dst: cie_xyz_d65_interchange}",
+        *(f"        - {transform}" for transform in transforms),
+        "",
+    ]
+    lines = _inserted(text.splitlines(), base, "displays", shown, at_end=True)
+    lines = _inserted(lines, base, "colorspaces", space, at_end=False)
+    edited = "\n".join(lines) + "\n"
+    edited = re.sub(r"^(active_displays: \[.*)\]", lambda found: f"{found[1]}, {_quoted(display)}]", edited, count=1,
+                    flags=re.MULTILINE)  # fmt: skip
+    return edited if edited.startswith(_MARK) else f"{_MARK} {base.name}, which says of itself:\n{edited}"
+
+
+def _quoted(name: str) -> str:
+    return f'"{name}"'
+
+
+def _inserted(lines: list[str], base: Path, section: str, new: list[str], *, at_end: bool) -> list[str]:
+    """Lines with new ones at the begin or the end of a top-level section."""
+    if f"{section}:" not in lines:
+        raise DisplayError(f"has no section '{section}'", where=base, remedy=_REMEDY)
+    at = lines.index(f"{section}:") + 1
+    if at_end:
+        at = next(_ends(lines, at))
+    return [*lines[:at], *new, *lines[at:]]
+
+
+def _ends(lines: list[str], start: int) -> Iterator[int]:
+    """Where a section can end: at lines that are neither empty nor indented."""
+    yield from (index for index in range(start, len(lines)) if lines[index][:1] not in ("", " "))
+    yield len(lines)
