@@ -94,8 +94,36 @@ def verify(arguments: argparse.Namespace) -> Result:
     scene = _open(arguments.file)
     lights = arguments.light or list(state.description(scene).lights)
     started = time.perf_counter()
+    if arguments.profile:
+        return _verify_display(arguments, scene, lights)
     results = verifying.verify(scene, lights, tuple(arguments.level or (0, 1, 2)), arguments.images, progress)
     return verifying.document(scene, results, time.perf_counter() - started)
+
+
+def _verify_display(arguments: argparse.Namespace, scene: bpy.types.Scene, lights: list[str]) -> Result:
+    """Verify the codes that a display of the running OpenColorIO config gets, see `config`."""
+    from spectral_core.display import load_profile
+
+    from .bridge.display import Display, verify_display
+
+    profile = load_profile(arguments.profile)
+    display = Display(arguments.display or profile.name, arguments.view)
+    results = verify_display(scene, lights, profile, display, progress)
+    return {
+        "scene": scene.spectral_booth.description.name.removesuffix(".toml"),
+        "blender": bpy.app.version_string,
+        "profile": profile.name,
+        "display": display.name,
+        "view": display.view,
+        "lights": [each.to_json() for each in results],
+    }
+
+
+def config(arguments: argparse.Namespace) -> Result:
+    """Tell where Blender's own OpenColorIO config is."""
+    from .bridge.display import config_path
+
+    return {"config": str(config_path()), "blender": bpy.app.version_string}
 
 
 def bake_texture(arguments: argparse.Namespace) -> Result:
@@ -191,6 +219,10 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--light", action="append", help="repeat for several; all of the scene's if left out")
     command.add_argument("--level", type=int, choices=(0, 1, 2), action="append")
     command.add_argument("--images", type=Path, help="keep the renders in this folder")
+    command.add_argument("--profile", help="compare the codes of the profile's display instead, see --display")
+    command.add_argument("--display", help="its name in the OpenColorIO config that Blender was started with")
+    command.add_argument("--view", default="Standard")
+    verb("config", config)
     command = verb("bake", bake_texture)
     command.add_argument("file", type=Path)
     command.add_argument("--light", action="append", required=True)

@@ -45,8 +45,8 @@ def blender_command() -> list[str]:
     return [application, "--background", "--command", "spectral_booth"]
 
 
-def run_verb(arguments: Sequence[str], progress: Progress | None = None) -> dict[str, Any]:
-    """Run a verb with its arguments and return its JSON result.
+def run_verb(arguments: Sequence[str], progress: Progress | None = None, ocio: Path | None = None) -> dict[str, Any]:
+    """Run a verb with its arguments and return its JSON result; `ocio` is the OpenColorIO config to start with.
 
     Raises
     ------
@@ -66,6 +66,7 @@ def run_verb(arguments: Sequence[str], progress: Progress | None = None) -> dict
             stderr=subprocess.STDOUT,
             text=True,
             errors="replace",
+            env={**os.environ, "OCIO": str(ocio)} if ocio else None,
         ) as process:
             try:
                 refused = _follow(process, tail, progress)

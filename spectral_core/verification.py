@@ -135,9 +135,9 @@ def compare(
         dE00=percentiles(dE00),
         dE00_in_gamut=percentiles(dE00[inside]),
         stages={
-            "8-bit rounding": _spread(np.abs(_codes(exact) - np.round(_codes(exact)))),
-            "material": _spread(np.abs(_codes(stored) - _codes(exact))),
-            "Eevee": _spread(np.abs(_codes(rendered) - _codes(stored))),
+            "8-bit rounding": spread(np.abs(_codes(exact) - np.round(_codes(exact)))),
+            "material": spread(np.abs(_codes(stored) - _codes(exact))),
+            "Eevee": spread(np.abs(_codes(rendered) - _codes(stored))),
         },
         patches=len(readings),
         in_gamut=int(inside.sum()),
@@ -152,6 +152,13 @@ def percentiles(values: Float64Array) -> Percentiles:
     if not len(values):
         return Percentiles(0.0, 0.0, 0.0)
     return Percentiles(float(values.mean()), float(np.percentile(values, 95)), float(values.max()))
+
+
+def spread(values: Float64Array) -> Spread:
+    """Mean, standard deviation and maximum of all values; zeros for none."""
+    if not values.size:
+        return Spread(0.0, 0.0, 0.0)
+    return Spread(float(values.mean()), float(values.std()), float(values.max()))
 
 
 @dataclass(frozen=True)
@@ -202,7 +209,7 @@ def texture_difference(rendered: Float64Array, exact: Float64Array) -> TextureDi
     """8-bit differences of an object's pixels (n, 3) of linear RGB, clipped to 0..1 on both sides."""
     means = [np.clip(each, 0.0, 1.0).mean(axis=0) for each in (rendered, exact)]
     mean_colour = float(np.abs(_codes(means[0]) - _codes(means[1])).max())
-    return TextureDifference(mean_colour, _spread(np.abs(_codes(rendered) - _codes(exact))))
+    return TextureDifference(mean_colour, spread(np.abs(_codes(rendered) - _codes(exact))))
 
 
 def conditions(lighting: Lighting, clipped: dict[str, int], extended: dict[str, float]) -> tuple[str, ...]:
@@ -265,10 +272,4 @@ def _per_patch(
 
 
 def _per_channel(difference: Float64Array) -> dict[str, Spread]:
-    return {channel: _spread(difference[:, index]) for index, channel in enumerate("RGB")}
-
-
-def _spread(values: Float64Array) -> Spread:
-    if not values.size:
-        return Spread(0.0, 0.0, 0.0)
-    return Spread(float(values.mean()), float(values.std()), float(values.max()))
+    return {channel: spread(difference[:, index]) for index, channel in enumerate("RGB")}

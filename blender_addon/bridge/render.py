@@ -53,6 +53,13 @@ def render_png(scene: bpy.types.Scene, path: Path, stereo: bool = False) -> floa
     return time.perf_counter() - started
 
 
+def save_shown(scene: bpy.types.Scene, path: Path) -> Float32Array:
+    """Codes (height, width, 3) of the last render through the scene's display, from a 16-bit PNG at `path`."""
+    with _output(scene, path, "PNG", "16"):
+        bpy.data.images["Render Result"].save_render(str(path), scene=scene)
+    return _read(path)
+
+
 @contextmanager
 def _both_eyes(scene: bpy.types.Scene, stereo: bool) -> Iterator[None]:
     if not stereo:

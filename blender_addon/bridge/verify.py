@@ -54,6 +54,30 @@ class Step:
     what: str
 
 
+@dataclass(frozen=True)
+class View:
+    """What the camera sees: which pixels show what, and how much light falls there."""
+
+    identity: measure.Identity
+    illumination: measure.Illumination
+
+
+def survey(scene: bpy.types.Scene) -> View:
+    """Find out what the camera sees.
+
+    Raises
+    ------
+    BlenderError
+        If that is no spectral surface.
+    """
+    identity = measure.identify(scene)
+    if not any(mask.sum() >= _FEWEST_PIXELS for mask in identity.masks.values()):
+        raise BlenderError(
+            f"the camera of '{scene.name}' sees no spectral surface", remedy="aim it at some, or render larger"
+        )
+    return View(identity, _illumination(scene, state.description(scene), identity))
+
+
 def verify(
     scene: bpy.types.Scene,
     lights: Sequence[str],
@@ -87,12 +111,7 @@ def verify_steps(
         resolve_light(light, description.folder)  # refuse a wrong name before the first render
     yield Step(0.0, "what the camera sees")
     before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
-    identity = measure.identify(scene)
-    if not any(mask.sum() >= _FEWEST_PIXELS for mask in identity.masks.values()):
-        raise BlenderError(
-            f"the camera of '{scene.name}' sees no spectral surface", remedy="aim it at some, or render larger"
-        )
-    illumination = _illumination(scene, description, identity)
+    view = survey(scene)
     results = []
     try:
         for index, light in enumerate(lights):
@@ -107,12 +126,12 @@ def verify_steps(
                 if images:
                     write_png(images / f"{file_name(light)}_level{level}.png", rendered.pixels)
                 gloss = (applied.lighting.lamp_rgb * applied.lighting.gloss_rgb).astype(np.float32)
-                diffuse = rendered.pixels - illumination.gloss[..., None] * gloss
-                readings = _read_patches(scene, description, applied.lighting, diffuse, identity, illumination)
+                diffuse = rendered.pixels - view.illumination.gloss[..., None] * gloss
+                readings = read_patches(scene, applied.lighting, diffuse, view)
                 found[level] = compare(readings, applied.lighting, switched, rendered.seconds)
                 if level == max(levels):
                     met = conditions(applied.lighting, applied.clipped, applied.extended)
-                    textures = _read_textures(scene, description, applied.lighting, diffuse, identity, illumination)
+                    textures = _read_textures(scene, applied.lighting, diffuse, view)
             results.append(LightResult(light, found, textures, met))
     finally:
         lighting.apply(scene, *before)
@@ -206,31 +225,25 @@ def _is_patch(item: bpy.types.Object) -> bool:
     return state.surface_name(item).startswith("colorchecker ") and len(item.data.polygons) == 1
 
 
-def _read_patches(
-    scene: bpy.types.Scene,
-    description: SceneDescription,
-    applied: Lighting,
-    rendered: Float32Array,
-    identity: measure.Identity,
-    illumination: measure.Illumination,
-) -> list[PatchReading]:
-    surfaces = scene_surfaces(description)
+def read_patches(scene: bpy.types.Scene, applied: Lighting, rendered: Float32Array, view: View) -> list[PatchReading]:
+    """Mean colours of the ColorChecker's patches, of all uniform surfaces without one."""
+    surfaces = scene_surfaces(state.description(scene))
     shown = state.managed_materials(scene)
     uniform = [
         item
         for item in state.managed_objects(scene)
-        if surfaces[state.surface_name(item)].uniform and identity.masks[item.name].sum() >= _FEWEST_PIXELS
+        if surfaces[state.surface_name(item)].uniform and view.identity.masks[item.name].sum() >= _FEWEST_PIXELS
     ]
     readings = []
     for item in [each for each in uniform if _is_patch(each)] or uniform:
-        mask = identity.masks[item.name]
+        mask = view.identity.masks[item.name]
         name = state.surface_name(item)
         readings.append(
             PatchReading(
                 name=item.name,
                 surface=name,
                 rendered=rendered[mask].mean(axis=0, dtype=np.float64),
-                irradiance=float(illumination.irradiance[mask].mean(dtype=np.float64)),
+                irradiance=float(view.illumination.irradiance[mask].mean(dtype=np.float64)),
                 stored=materials.stored_colour(shown[name]),
                 exact=applied.exact_rgb(surfaces[name]),
             )
@@ -239,23 +252,18 @@ def _read_patches(
 
 
 def _read_textures(
-    scene: bpy.types.Scene,
-    description: SceneDescription,
-    applied: Lighting,
-    rendered: Float32Array,
-    identity: measure.Identity,
-    illumination: measure.Illumination,
+    scene: bpy.types.Scene, applied: Lighting, rendered: Float32Array, view: View
 ) -> dict[str, TextureDifference]:
     """Per textured object, its pixels against the texture's exact colours at the same points."""
-    surfaces = scene_surfaces(description)
+    surfaces = scene_surfaces(state.description(scene))
     found = {}
     for item in state.managed_objects(scene):
         surface: Surface = surfaces[state.surface_name(item)]
-        mask = identity.masks[item.name] & (illumination.irradiance > _LEAST_IRRADIANCE)
+        mask = view.identity.masks[item.name] & (view.illumination.irradiance > _LEAST_IRRADIANCE)
         if surface.uniform or mask.sum() < _FEWEST_PIXELS:
             continue
-        exact: Float64Array = measure.sample(applied.exact_rgb(surface), identity.uv[mask])
+        exact: Float64Array = measure.sample(applied.exact_rgb(surface), view.identity.uv[mask])
         found[item.name] = texture_difference(
-            rendered[mask].astype(np.float64), exact * illumination.irradiance[mask][:, None]
+            rendered[mask].astype(np.float64), exact * view.illumination.irradiance[mask][:, None]
         )
     return found

@@ -12,6 +12,9 @@ from spectral_core.blender_process import run_verb
 from spectral_core.cli.console import Document, emit, facts, progress_bar, rounded, table
 from spectral_core.cli.options import FiniteRange, as_json
 from spectral_core.demo import run_demo
+from spectral_core.display import load_profile
+from spectral_core.display.export import export_ocio
+from spectral_core.errors import DisplayError
 from spectral_core.report.html import ReportInput, SceneRun, find_renders, write_report
 from spectral_core.scene import load_scene
 
@@ -65,15 +68,24 @@ def render(file: Path, light: str | None, level: str | None, stereo: bool, outpu
     show_default=True,
     help="largest 8-bit difference allowed at level 2",
 )
+@click.option(
+    "--profile", metavar="PROFILE", help="render through this display instead, and compare its codes with the profile's"
+)
 @as_json
 def verify(
     file: Path, lights: Sequence[str], levels: Sequence[str], images: Path | None, report: Path | None, limit: float,
-    json: bool,
+    profile: str | None, json: bool,
 ) -> int:  # fmt: skip
     """Render a built FILE (.blend) and compare its pixels with theory.
 
-    Ends with 1 if level 2 differs by more than --limit over the patches in gamut.
+    Ends with 1 if level 2 differs by more than --limit over the patches in gamut. With --profile the
+    display is exported to OpenColorIO, Blender renders level 2 through it, and the codes that come
+    out are compared with the profile's own.
     """
+    if profile is not None:
+        if levels or images or report:
+            raise DisplayError("--profile goes with --light and --limit only", remedy="leave the other options out")
+        return _verify_display(file, lights, profile, limit, json)
     arguments = ["verify", str(file)]
     arguments += [part for light in lights for part in ("--light", light)]
     arguments += [part for level in levels for part in ("--level", level)]
@@ -97,6 +109,34 @@ def demo(output: Path, json: bool) -> None:
     with progress_bar("demo") as progress:
         document = run_demo(output, progress)
     emit(document, json, lambda console: console.print(facts(document)))
+
+
+def _verify_display(file: Path, lights: Sequence[str], profile: str, limit: float, json: bool) -> int:
+    display = load_profile(profile)
+    with tempfile.TemporaryDirectory() as folder, progress_bar(f"verifying {file.name}") as progress:
+        exported = export_ocio(display, Path(folder) / "ocio", Path(run_verb(["config"])["config"]))
+        arguments = ["verify", str(file), "--profile", profile]
+        arguments += ["--display", exported.display, "--view", exported.view]
+        arguments += [part for light in lights for part in ("--light", light)]
+        document = run_verb(arguments, progress, exported.config)
+    failed = [each["name"] for each in document["lights"] if each["codes8"]["max"] > limit]
+    document = {**document, "limit": limit, "failed": failed}
+    rows = [
+        [
+            each["name"],
+            f"{each['in_gamut']} of {each['patches']}",
+            *rounded([each[key][figure] for key in _SHOWN for figure in ("mean", "max")], 3),
+            ", ".join(each["lost"]) or "none",
+        ]
+        for each in document["lights"]
+    ]
+    title = f"{document['scene']} through {document['display']}, Blender {document['blender']}: 8-bit levels"
+    emit(document, json, lambda console: console.print(table(_SHOWN_COLUMNS, rows, title)))
+    return 1 if failed else 0
+
+
+_SHOWN = ("codes8", "codes8_clipped", "theory8")
+_SHOWN_COLUMNS = ("light", "in gamut", "display", "max", "clipped", "max", "and Eevee", "max", "not in Rec.709")
 
 
 def add_blender_commands(group: click.Group) -> None:
