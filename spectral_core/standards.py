@@ -104,8 +104,14 @@ def srgb_to_XYZ_matrix() -> Float64Array:
 
     Derived from the primaries rather than taken rounded, so that its inverse is exact.
     """
-    space = _colour().RGB_COLOURSPACES["sRGB"]
-    return frozen(_colour().normalised_primary_matrix(space.primaries, space.whitepoint))
+    return rgb_to_XYZ_matrix("sRGB")
+
+
+@cache
+def rgb_to_XYZ_matrix(space: str) -> Float64Array:
+    """Linear RGB of one of colour-science's RGB spaces to XYZ with white Y = 1: (3, 3)."""
+    found = _colour().RGB_COLOURSPACES[space]
+    return frozen(_colour().normalised_primary_matrix(found.primaries, found.whitepoint))
 
 
 def XYZ_to_Lab(XYZ: Float64Array, white_XYZ: Float64Array) -> Float64Array:
