@@ -1,4 +1,4 @@
-"""Commands of ``spectral-booth`` about what is between codes and light: probe, compare."""
+"""The command ``spectral-booth probe``: what the headset's runtime did to the codes."""
 
 from __future__ import annotations
 
@@ -126,6 +126,6 @@ def _show(console: Any, document: Document) -> None:
     console.print(facts(shown))
 
 
-def add_probe_commands(group: click.Group) -> None:
-    """Add this module's commands to the program."""
+def add_probe_command(group: click.Group) -> None:
+    """Add this module's command to the program."""
     group.add_command(probe)

@@ -37,8 +37,9 @@ DECIDED = 6.0
 # Misfit beyond this many times the noise, or more than this share of readings five deviations off: the
 # truth is none of the hypotheses.
 _EXPLAINED, _BAD_SHARE = 2.0, 0.1
-# Hypotheses whose colours differ by less than this on average are one to the eye.
-_SAME_DE00 = 1.0
+# Hypotheses whose colours differ by less than this on average are one to the eye; by less than a profile
+# may be off, the simplest is taken.
+_SAME_DE00, _NEGLIGIBLE_DE00 = 1.0, 0.5
 _FEWEST = 8
 _STEPS = 30
 
@@ -88,11 +89,11 @@ class Probe:
     Attributes
     ----------
     best
-        The hypothesis of the smallest score.
+        The hypothesis of the smallest score, or a simpler one of practically the same effect.
     decided
         Whether the readings tell it from every other one of another effect.
     fits
-        All hypotheses, best first.
+        All hypotheses, smallest score first.
     rivals
         Those of another effect that the readings do not tell from the best.
     margin
@@ -272,13 +273,21 @@ def _capped(residuals: Float64Array) -> Float64Array:
 
 
 def _verdict(fits: list[Fit], noise: float, readings: _Readings, profiled: bool) -> Probe:
-    best, *others = fits
+    simple = [fit for fit in fits if len(fit.parameters) < len(fits[0].parameters)]
+    same = [fit for fit in simple if _effect(fit, fits[0]) < _NEGLIGIBLE_DE00]
+    best = min((fits[0], *same), key=lambda fit: len(fit.parameters))
+    others = [fit for fit in fits if fit is not best]
     # What has the same effect is no rival, whatever its name: its correction is as good.
     others = [fit for fit in others if _effect(fit, best) > _SAME_DE00]
     rivals = tuple(fit for fit in others if _is_rival(fit, best, noise))
     far = np.flatnonzero(best.misfit > _CAP / 2)
     explained = noise <= _EXPLAINED and len(far) <= max(1, _BAD_SHARE * len(readings.codes))
     warnings = []
+    if best is not fits[0]:
+        warnings.append(
+            f"{fits[0].runtime.name} fits better, but differs from {best.runtime.name} by less than a profile "
+            f"may be off ({_effect(fits[0], best):.2f} dE00)"
+        )
     if not explained:
         warnings.append(
             f"no hypothesis explains the readings: the nearest, {best.runtime.name}, leaves {best.dE00.mean():.1f} "

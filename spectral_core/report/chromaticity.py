@@ -47,7 +47,7 @@ def chromaticity_plot(lights: Mapping[str, Float64Array]) -> str:
         whole, near = figure.subplots(1, 2, gridspec_kw={"width_ratios": [1, 1.12]})
         box = _surroundings(np.array([xy for _, xy in dots]))
         for axes in (whole, near):
-            _background(axes)
+            draw_diagram(axes)
             axes.grid(color=GRID, linewidth=0.5, alpha=0.7)
             axes.set_aspect("equal")
             axes.set(xlabel="x", ylabel="y")
@@ -91,7 +91,7 @@ def _surroundings(xy: Float64Array) -> tuple[float, float, float, float]:
     )
 
 
-def _background(axes: Any) -> None:
+def draw_diagram(axes: Any) -> None:
     """The diagram's colours, pale, inside the locus only."""
     size = 256
     x = np.linspace(_DIAGRAM[0], _DIAGRAM[1], size)
