@@ -19,12 +19,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "core"))
-import displays  # noqa: E402
+import displays
 
-from spectral_core.display.models import GammaMatrix  # noqa: E402
-from spectral_core.display.probe import probe  # noqa: E402
-from spectral_core.display.probe_patches import probe_patches  # noqa: E402
-from spectral_core.display.runtimes import Runtime, combined_runtimes, single_runtimes  # noqa: E402
+from spectral_core.display.models import GammaMatrix
+from spectral_core.display.probe import probe
+from spectral_core.display.probe_patches import probe_patches
+from spectral_core.display.runtimes import Runtime, combined_runtimes, single_runtimes
 
 WHITE_Y = displays.additive(np.ones((1, 3)))[0, 1]
 PANEL = GammaMatrix(displays.GAMMA, displays.MATRIX / WHITE_Y, displays.BLACK / WHITE_Y)
