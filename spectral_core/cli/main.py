@@ -12,10 +12,12 @@ import click
 from spectral_core import documents
 from spectral_core.baking import bake
 from spectral_core.cli.blender import add_blender_commands
+from spectral_core.cli.compare import add_compare_command
 from spectral_core.cli.console import cell, emit, facts, progress_bar, rounded, table
 from spectral_core.cli.display import add_display_commands
 from spectral_core.cli.luminance import add_luminance_commands
 from spectral_core.cli.options import FiniteRange, as_json, light_option, observer_option, profile_option
+from spectral_core.cli.probe import add_probe_command
 from spectral_core.cli.profile import add_profile_commands
 from spectral_core.display import load_profile
 from spectral_core.errors import LightError, SpectralBoothError
@@ -175,6 +177,8 @@ def bake_command(
 add_display_commands(cli)
 add_profile_commands(cli)
 add_luminance_commands(cli)
+add_probe_command(cli)
+add_compare_command(cli)
 add_blender_commands(cli)
 
 

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import io
+from pathlib import Path
 from typing import Any
 
+from spectral_core.errors import OutputError
+from spectral_core.files import atomic_path
 from spectral_core.report.embedding import data_uri
 from spectral_core.report.extras import extra
 
@@ -16,6 +19,8 @@ LEVEL_COLOURS = {0: "#9aa1ab", 1: "#d55e00", 2: "#0072b2"}
 LEVEL_MARKERS = {0: "o", 1: "s", 2: "D"}
 LEVEL_NAMES = {0: "level 0, unmanaged", 1: "level 1, lamps", 2: "level 2, spectral"}
 SERIES_COLOURS = ("#e69f00", "#56b4e9", "#009e73", "#cc79a7", "#d55e00", "#0072b2", "#8a919c", "#2b3038")
+# Of PNG: sharp on a screen of twice the usual density, and in print.
+_DOTS_PER_INCH = 200
 _STYLE = {
     # Outlines instead of text: labels keep their places whatever fonts the reader has.
     "svg.fonttype": "path",
@@ -62,3 +67,19 @@ def svg_uri(figure: Any) -> str:
     with style():
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None}, transparent=True)
     return data_uri(buffer.getvalue(), "svg+xml")
+
+
+def write_figure(figure: Any, path: Path) -> None:
+    """Write a figure as ``.png`` or ``.svg``, whichever the path names.
+
+    Raises
+    ------
+    OutputError
+        If it names another, or cannot be written.
+    """
+    kind = path.suffix.casefold().removeprefix(".")
+    if kind not in ("png", "svg"):
+        raise OutputError("is no .png or .svg", where=path, remedy="name one")
+    metadata = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+    with style(), atomic_path(path) as temporary:
+        figure.savefig(temporary, format=kind, metadata=metadata, dpi=_DOTS_PER_INCH)
