@@ -15,15 +15,16 @@ from spectral_core.display.patch_sets import PUBLISHED, SMALLEST, extension, pub
 from spectral_core.display.simulated import SimulatedDisplay, assumed_display, simulated
 from spectral_core.errors import DisplayError
 
-SIZES = (20, 30, 45, 60, 90, 130, PUBLISHED)
+SIZES = (20, 30, 45, 60, 90, 140, PUBLISHED)
 LARGEST = 500
 _MORE = (30, 90)
 # A set this little larger than the measured one is no advice.
 _FEWEST_NEW = 8
 _UNSEEN = 400
-_DRAWS = 6
-# Student's t of 5 degrees of freedom, 95 %, for one more draw: t sqrt(1 + 1 / draws).
-_PREDICTION = 2.571 * np.sqrt(1 + 1 / _DRAWS)
+_DRAWS = 5
+_TRIALS = 3
+# Student's t of 4 degrees of freedom, 95 %, for one more draw: t sqrt(1 + 1 / draws).
+_PREDICTION = 2.776 * np.sqrt(1 + 1 / _DRAWS)
 _SEED = 7
 Report = Callable[[float, str], None]
 
@@ -96,8 +97,8 @@ def advise(
     codes = codes[:0] if chosen.kind == "measured" else codes
     warnings = () if found is None else found.warnings
     if not reached:
-        warnings += (f"no set promises dE00 {accuracy:g}: the best is advised; less noise would help",)
-    why = f"{_basis(found, display, unexplained)}; {_reason(chosen, accuracy, patches)}"
+        warnings += (f"no set on trial promises dE00 {accuracy:g}; readings of less noise would help",)
+    why = f"{_basis(found, display, unexplained)}; {_reason(chosen, accuracy, patches, reached)}"
     return Advice(_shown_order(codes), tuple(predicted), chosen, why, warnings)
 
 
@@ -117,19 +118,18 @@ def _sets(known: Float64Array | None, patches: int | None, display: SimulatedDis
     return sets
 
 
-def _prediction(kind: str, codes: Float64Array, display: SimulatedDisplay, unexplained: float) -> Prediction:
+def _prediction(name: str, codes: Float64Array, display: SimulatedDisplay, unexplained: float) -> Prediction:
     """Measure the set on the simulated display several times, fit, and ask for unseen colours."""
     rng = np.random.default_rng(_SEED)
     unseen = np.random.default_rng(_SEED + 1).uniform(0, 1, (_UNSEEN, 3))
     truth, white = display.XYZ(unseen), display.XYZ(np.ones((1, 3)))[0]
-    first = display.measure(codes, rng)
-    model = _kind(characterise(first).chosen.name)
+    kind = _kind(characterise(display.measure(codes, rng)).chosen.name)
     means = []
     for _ in range(_DRAWS):
-        readings = display.measure(codes, rng)
-        means.append(errors(model.fit(readings), Measurements(unseen, truth), white).mean())
+        model = kind.fit(display.measure(codes, rng))
+        means.append(errors(model, Measurements(unseen, truth), white).mean())
     mean = float(np.hypot(np.mean(means), unexplained))
-    return Prediction(len(codes), kind, mean, float(_PREDICTION * np.std(means, ddof=1)), codes)
+    return Prediction(len(codes), name, mean, float(_PREDICTION * np.std(means, ddof=1)), codes)
 
 
 def _pooled(predicted: list[Prediction]) -> list[Prediction]:
@@ -139,16 +139,27 @@ def _pooled(predicted: list[Prediction]) -> list[Prediction]:
 
 
 def _unexplained(found: Characterisation, display: SimulatedDisplay) -> float:
-    """Held-out dE00 that the simulated display does not show: what the chosen model cannot follow."""
+    """Held-out dE00 that the simulated display does not show: what the chosen model cannot follow.
+
+    0 if it is no larger than the standard error of the held-out mean.
+    """
     if found.chosen.held_out is None:
         return 0.0
-    readings = display.measure(found.measured.codes, np.random.default_rng(_SEED))
-    expected = float(held_out_errors(readings, _kind(found.chosen.name)).mean())
-    return float(np.sqrt(max(found.chosen.held_out.mean**2 - expected**2, 0.0)))
+    rng = np.random.default_rng(_SEED)
+    kind = _kind(found.chosen.name)
+    expected = float(
+        np.mean([held_out_errors(display.measure(found.measured.codes, rng), kind).mean() for _ in range(_TRIALS)])
+    )
+    mean, uncertainty = found.chosen.held_out.mean, _standard_error(found.chosen.held_out_errors)
+    return float(np.sqrt(mean**2 - expected**2)) if mean > expected + uncertainty else 0.0
 
 
 def _kind(name: str) -> ModelKind:
     return next(kind for kind in MODEL_KINDS if kind.name == name)
+
+
+def _standard_error(values: Float64Array) -> float:
+    return float(values.std(ddof=1) / np.sqrt(len(values)))
 
 
 def _choose(predicted: list[Prediction], accuracy: float | None, size: int | None) -> tuple[Prediction, bool]:
@@ -175,12 +186,12 @@ def _basis(found: Characterisation | None, display: SimulatedDisplay, unexplaine
     return f"{text}; dE00 {unexplained:.2f} of its held-out error is not explained by that, and is kept"
 
 
-def _reason(chosen: Prediction, accuracy: float | None, patches: int | None) -> str:
+def _reason(chosen: Prediction, accuracy: float | None, patches: int | None, reached: bool) -> str:
     promise = f"dE00 {chosen.mean:.2f} +- {chosen.spread:.2f} on unseen colours"
     if chosen.kind == "measured":
         return f"what is measured is enough: {promise}"
-    if patches is not None:
-        return f"{chosen.patches} patches promise {promise}"
+    if patches is not None or not reached:
+        return f"{chosen.patches} patches{'' if reached else ', the best here,'} promise {promise}"
     goal = "as good as the best within its spread" if accuracy is None else f"for dE00 {accuracy:g}"
     return f"{chosen.patches} patches in all are the fewest {goal}: {promise}"
 

@@ -61,7 +61,7 @@ def check(measured: Measurements) -> Checks:
     noise_dE00, repeated = noise(relative), reading_noise(relative)
     verdicts = (
         _additivity(additivity),
-        *mixes_add_up(relative, noise_dE00),
+        *mixes_add_up(relative, repeated),
         _black(measured, black_share),
         monotonic(relative, None if repeated is None else 100 * repeated[0]),
         saturation(relative),

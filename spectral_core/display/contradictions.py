@@ -20,7 +20,9 @@ _LARGEST_DRIFT = 1.5
 # What is left of white's readings about their trend, (largest - smallest) / mean: instruments repeat to
 # 1 or 2 %, so that ten readings span at most a tenth.
 _LARGEST_SPREAD = 0.2
-_FEWEST_LEVELS = 4
+_FEWEST_LEVELS = 3
+# Of white: a channel without light may read anything less.
+_BACKWARD = 0.01
 
 
 def refuse_contradictions(measured: Measurements, path: Path) -> None:
@@ -72,13 +74,18 @@ def _refuse_contradictory_white(measured: Measurements, path: Path) -> None:
 
 
 def _refuse_backward_ramps(measured: Measurements, path: Path) -> None:
-    """A ramp is backwards if its upper half is darker on average than its lower half, black included."""
+    """A ramp is backwards if its upper half is darker on average than its lower half, ends left out."""
+    margin = _BACKWARD * measured.white_XYZ[1]
     for index, name in enumerate(("red", "green", "blue", "grey")):
         ramp = measured.subset(measured.grey if name == "grey" else measured.channel(index))
-        levels = ramp.codes.max(axis=1)
-        middle = np.median(np.unique(levels.round(4)))
-        low, high = ramp.XYZ[levels < middle, 1], ramp.XYZ[levels > middle, 1]
-        if len(np.unique(levels.round(4))) >= _FEWEST_LEVELS and high.mean() < low.mean():
+        code = ramp.codes.max(axis=1)
+        inner = (code > _CODES) & (code < 1 - _CODES)
+        levels = np.unique(code[inner].round(4))
+        if len(levels) < _FEWEST_LEVELS:
+            continue
+        low = ramp.XYZ[inner & (code < np.median(levels) - _CODES), 1]
+        high = ramp.XYZ[inner & (code > np.median(levels) + _CODES), 1]
+        if high.mean() < low.mean() - margin:
             raise DisplayError(
                 f"the {name} ramp runs backwards: {low.mean():.4g} on average over its lower codes, "
                 f"{high.mean():.4g} over its upper ones",

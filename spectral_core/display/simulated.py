@@ -11,6 +11,7 @@ from spectral_core.display.builtin import load_profile
 from spectral_core.display.characterise import Characterisation
 from spectral_core.display.measurements import Measurements
 from spectral_core.display.models import DisplayModel
+from spectral_core.display.noise import noisy
 from spectral_core.display.repeats import reading_noise
 
 # Of an instrument nobody knows: what the published headset's was, in ln Y and in x and y.
@@ -49,13 +50,7 @@ class SimulatedDisplay:
 
     def measure(self, codes: Float64Array, rng: np.random.Generator) -> Measurements:
         """Readings of codes (n, 3)."""
-        XYZ = self.XYZ(codes)
-        total = np.maximum(XYZ.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-        moved = XYZ[:, :2] / total + rng.normal(0, self.noise[1], (len(codes), 2))
-        # Chromaticity moves at the same luminance, then luminance at the same chromaticity.
-        share = np.column_stack([moved, 1 - moved.sum(axis=1)])
-        scale = XYZ[:, 1:2] / np.maximum(share[:, 1:2], 1e-3) * np.exp(rng.normal(0, self.noise[0], (len(codes), 1)))
-        return Measurements(frozen(codes), frozen(share * scale))
+        return Measurements(frozen(codes), frozen(noisy(self.XYZ(codes), self.noise, rng)))
 
 
 def assumed_display() -> SimulatedDisplay:
@@ -95,4 +90,9 @@ def _noise(found: Characterisation) -> tuple[float, float]:
     bright = measured.XYZ[:, 1] > _BRIGHT
     XYZ, fitted = measured.XYZ[bright], found.chosen.model.forward(measured.codes[bright])
     xy_error = XYZ[:, :2] / XYZ.sum(axis=1, keepdims=True) - fitted[:, :2] / fitted.sum(axis=1, keepdims=True)
-    return float(np.std(np.log(XYZ[:, 1] / fitted[:, 1]))), float(np.std(xy_error))
+    return _robust_deviation(np.log(XYZ[:, 1] / fitted[:, 1])), _robust_deviation(xy_error)
+
+
+def _robust_deviation(values: Float64Array) -> float:
+    """Standard deviation of a normal distribution with this median size: one bad patch does not count."""
+    return float(1.4826 * np.median(np.abs(values)))

@@ -9,6 +9,7 @@ import numpy as np
 from spectral_core.arrays import BoolArray, Float64Array
 from spectral_core.display.fitting import channel_lut
 from spectral_core.display.measurements import SAME_CODE, Measurements
+from spectral_core.display.noise import noisy
 from spectral_core.display.tone_models import LutMatrix
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
@@ -28,6 +29,8 @@ _JUST_SEEN_DE00 = 1.0
 # displays are steeper than the line, and a headset that dims at high loads keeps three quarters of it.
 _SATURATED_SLOPE = 0.25
 _SATURATED_CODES = 0.03
+# Simulated, to know the noise of one to 5 %.
+_READINGS = 200
 
 
 @dataclass(frozen=True)
@@ -98,9 +101,9 @@ def monotonic(measured: Measurements, noise_percent: float | None) -> Verdict:
             worst = float(drop[at] / white_Y * 100)
             code = ramp.codes[at].max()
             advice = f"the {name} ramp falls at code {code:.3f} by {worst:.2f} % of white: measure it there again"
-    allowed = 3 * np.sqrt(2) * (noise_percent or 0.0)
+    allowed = float(3 * np.sqrt(2) * (noise_percent or 0.0))
     limit, why = max((_RAMP_PERCENT, "less is rounding and noise"), (allowed, "3 sd of two readings' difference"))
-    passed = worst <= limit
+    passed = bool(worst <= limit)
     return Verdict(
         "ramps rise", worst, "% of white", limit, why, passed, "the ramps rise with the code" if passed else advice
     )
@@ -128,15 +131,15 @@ def saturation(measured: Measurements) -> Verdict:
     )  # fmt: skip
 
 
-def mixes_add_up(measured: Measurements, noise_dE00: float | None) -> tuple[Verdict, ...]:
+def mixes_add_up(measured: Measurements, noise: tuple[float, float] | None) -> tuple[Verdict, ...]:
     """Mixed colours against the sum of their channels' own ramps at the same codes; and independence."""
     testable = _testable(measured)
     mixed = measured.subset(testable)
     if not testable.any():
         advice = "measure ramps of each channel, and mixes of two and of three, to learn whether mixes add up"
-        return (untold("additivity of mixes", "dE00, mean", advice), untold("channel independence", "% of white", advice))
+        return untold("additivity of mixes", "dE00, mean", advice), untold("channel independence", "% of white", advice)
     summed = channel_lut(measured)
-    return _sums(mixed, summed, measured.white_XYZ, noise_dE00), _independence(mixed, summed, measured.white_XYZ)
+    return _sums(mixed, summed, measured.white_XYZ, noise), _independence(mixed, summed, measured.white_XYZ, noise)
 
 
 def _testable(measured: Measurements) -> BoolArray:
@@ -149,7 +152,9 @@ def _testable(measured: Measurements) -> BoolArray:
     return np.asarray(result)
 
 
-def _sums(mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Array, noise_dE00: float | None) -> Verdict:
+def _sums(
+    mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Array, noise: tuple[float, float] | None
+) -> Verdict:
     predicted = summed.forward(mixed.codes)
     percent = 100 * np.abs((mixed.XYZ - predicted) / white_XYZ).max(axis=1)
     dE00 = delta_E_2000(XYZ_to_Lab(predicted, white_XYZ), XYZ_to_Lab(mixed.XYZ, white_XYZ))
@@ -157,9 +162,9 @@ def _sums(mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Array, noise
         "mean_percent": float(percent.mean()), "max_percent": float(percent.max()),
         "mean_dE00": float(dE00.mean()), "max_dE00": float(dE00.max()), "mixes": float(len(dE00)),
     }  # fmt: skip
-    limit, why = max(
-        (_JUST_SEEN_DE00, "just seen side by side"), (np.sqrt(2) * (noise_dE00 or 0.0), "noise of two readings")
-    )
+    # A reading's noise, and as much again for the sum's.
+    expected = np.sqrt(2) * _noise_dE00(mixed.XYZ, noise, white_XYZ) if noise else 0.0
+    limit, why = max((_JUST_SEEN_DE00, "just seen side by side"), (expected, "noise of two readings"))
     passed = bool(dE00.mean() <= limit)
     found = (
         f"differ from the sum of their channels by {details['mean_percent']:.2g} % of white on average, "
@@ -169,11 +174,20 @@ def _sums(mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Array, noise
     return Verdict("additivity of mixes", details["mean_dE00"], "dE00, mean", limit, why, passed, advice, details)
 
 
-def _independence(mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Array) -> Verdict:
+def _noise_dE00(XYZ: Float64Array, noise: tuple[float, float], white_XYZ: Float64Array) -> float:
+    """Mean dE00 that an instrument's noise alone gives these readings."""
+    read = noisy(XYZ, noise, np.random.default_rng(0))
+    return float(delta_E_2000(XYZ_to_Lab(read, white_XYZ), XYZ_to_Lab(XYZ, white_XYZ)).mean())
+
+
+def _independence(
+    mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Array, noise: tuple[float, float] | None
+) -> Verdict:
     """How much of white a channel's light changes when another is fully driven as well.
 
     Regression of what mixes have beyond their sum, in X, Y and Z over white, on the products of two
-    drives and of three; the largest of the pairs' coefficients.
+    drives and of three; the largest of the pairs' coefficients. Its error has that of the two
+    primaries' readings in it, which shift all sums alike.
     """
     name, unit = "channel independence", "% of white"
     drive = summed.decode(mixed.codes)
@@ -181,13 +195,15 @@ def _independence(mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Arra
     terms = np.column_stack([pairs, drive.prod(axis=1)])
     used = (terms > 0.01).sum(axis=0) >= 2
     if len(mixed.codes) < _FEWEST_MIXES or not used[:3].all() or np.linalg.matrix_rank(terms[:, used]) < used.sum():
-        return untold(name, unit, "measure mixes of each two channels at several codes to learn of it")
+        return untold(name, unit, "measure mixes of each two channels at several codes")
     terms = terms[:, used]
     beyond = 100 * (mixed.XYZ - summed.forward(mixed.codes)) / white_XYZ
     inverse = np.linalg.inv(terms.T @ terms)
     slopes = inverse @ terms.T @ beyond
     scatter = ((beyond - terms @ slopes) ** 2).sum(axis=0) / (len(terms) - terms.shape[1])
     error = np.sqrt(np.diag(inverse)[:, None] * scatter)
+    own = _primary_error_percent(summed, white_XYZ, noise) if noise else np.zeros((3, 3))
+    error[:3] = np.sqrt(error[:3] ** 2 + own[[0, 0, 1]] ** 2 + own[[1, 2, 2]] ** 2)
     pair, axis = np.unravel_index(np.abs(slopes[:3]).argmax(), (3, 3))
     value, uncertainty = float(slopes[pair, axis]), float(error[pair, axis])
     a, b = (("red", "green"), ("red", "blue"), ("green", "blue"))[pair]
@@ -196,3 +212,10 @@ def _independence(mixed: Measurements, summed: LutMatrix, white_XYZ: Float64Arra
     advice = found if passed else f"{found}: the channels depend on each other, so measure many mixes"
     limit, why = max((ADDITIVE_PERCENT, "as for white"), (3 * uncertainty, "three standard errors"))
     return Verdict(name, value, unit, limit, why, passed, advice, {"standard_error_percent": uncertainty})
+
+
+def _primary_error_percent(summed: LutMatrix, white_XYZ: Float64Array, noise: tuple[float, float]) -> Float64Array:
+    """Standard deviation (3 primaries, XYZ) of one reading of each, in percent of white."""
+    repeated = np.repeat(summed.matrix.T, _READINGS, axis=0)
+    read = noisy(repeated, noise, np.random.default_rng(0)) - repeated
+    return np.asarray(100 * read.reshape(3, _READINGS, 3).std(axis=1) / white_XYZ)
