@@ -129,7 +129,9 @@ def _prediction(name: str, codes: Float64Array, display: SimulatedDisplay, unexp
         model = kind.fit(display.measure(codes, rng))
         means.append(errors(model, Measurements(unseen, truth), white).mean())
     mean = float(np.hypot(np.mean(means), unexplained))
-    return Prediction(len(codes), name, mean, float(_PREDICTION * np.std(means, ddof=1)), codes)
+    # What is unexplained may be chance, or go as patches are added: the spread reaches down to none of it.
+    spread = float(_PREDICTION * np.std(means, ddof=1) + mean - np.mean(means))
+    return Prediction(len(codes), name, mean, spread, codes)
 
 
 def _pooled(predicted: list[Prediction]) -> list[Prediction]:
