@@ -134,8 +134,8 @@ def _with_spectra(measured: Measurements, spectra: Emission, observer: str, path
     measured = replace(measured, warnings=warnings, agreement=found)
     if observer == DEFAULT_OBSERVER:
         return measured
-    # The luminance of white stays what the instrument says: the spectra's units are not known.
-    scaled = spectral * (measured.XYZ[white, 1] / by_default[white, 1])
+    # Luminance belongs to the default observer: white keeps what the instrument says.
+    scaled = spectral * (measured.XYZ[white, 1] / spectral[white, 1])
     note = f"X, Y, Z are integrated from the spectra with {observer}; the instrument's own are not used"
     return replace(measured, XYZ=frozen(scaled), warnings=(*warnings, note))
 
