@@ -11,6 +11,7 @@ import numpy as np
 from spectral_core import light_design, standards, weights
 from spectral_core.arrays import Float64Array
 from spectral_core.display import DisplayProfile, srgb
+from spectral_core.display.advice import Advice
 from spectral_core.display.characterise import Characterisation
 from spectral_core.display.measurements import Measurements
 from spectral_core.display.profile import in_gamut
@@ -21,6 +22,7 @@ from spectral_core.spectra import Spectra
 from spectral_core.textures import HyperspectralTexture
 
 __all__ = [
+    "advice_document",
     "bake_document",
     "characterise_document",
     "design",
@@ -208,8 +210,28 @@ def characterise_document(found: Characterisation, original: Measurements) -> Do
         "black_XYZ": original.black_XYZ.tolist(),
         "white_XYZ": original.white_XYZ.tolist(),
         "unit": original.unit,
+        "patches": len(original.codes),
         "noise_dE00": found.checks.noise_dE00,
+        "checks": [asdict(each) for each in found.checks.verdicts],
         "warnings": list(found.warnings),
+    }
+
+
+def advice_document(advice: Advice) -> Document:
+    """`characterise --advise`: codes 0..1, each k/255."""
+    return {
+        "patches": advice.codes.tolist(),
+        "predicted": [
+            {
+                "patches": each.patches,
+                "set": each.kind,
+                "dE00": {"mean": each.mean, "spread": each.spread},
+                "chosen": each is advice.chosen,
+            }
+            for each in advice.predicted
+        ],
+        "why": advice.why,
+        "warnings": list(advice.warnings),
     }
 
 

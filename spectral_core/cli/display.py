@@ -15,18 +15,20 @@ import click
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.cli.console import Document, emit, rounded, table
-from spectral_core.cli.options import as_json, observer_option, profile_option
+from spectral_core.cli.console import Document, emit, progress_bar
+from spectral_core.cli.display_tables import show_advice, show_characterisation
+from spectral_core.cli.options import FiniteRange, as_json, observer_option, profile_option
 from spectral_core.cli.profile import make_profile, profile_warnings, state_options
 from spectral_core.display import load_profile, write_profile
+from spectral_core.display.advice import LARGEST, advise
 from spectral_core.display.characterise import characterise as choose
 from spectral_core.display.eyes import eye_difference
 from spectral_core.display.fitting import MODEL_KINDS
 from spectral_core.display.gamut import GAMUT_RULES, GamutCounts, map_to_gamut
-from spectral_core.display.measurements import read_measurements
-from spectral_core.documents import characterise_document
+from spectral_core.display.measurements import Measurements, read_measurements
+from spectral_core.documents import advice_document, characterise_document
 from spectral_core.errors import DisplayError
-from spectral_core.files import read_text
+from spectral_core.files import atomic_path, read_text
 from spectral_core.report.display import DisplayReport, Eye, write_display_report
 from spectral_core.standards import DEFAULT_OBSERVER
 
@@ -35,8 +37,8 @@ _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
 
 
 @click.command()
-@click.argument("file", type=_PATH)
-@click.option("-o", "--output", type=_PATH, help="write the profile as JSON")
+@click.argument("file", type=_PATH, required=False)
+@click.option("-o", "--output", type=_PATH, help="write the profile as JSON; with --advise, the patches as CSV")
 @click.option(
     "--model", type=click.Choice([kind.name for kind in MODEL_KINDS]), help="use this one instead of the best"
 )
@@ -45,16 +47,31 @@ _HEADERS = {"xyz": ["R", "G", "B"], "codes": ["X", "Y", "Z"]}
 @click.option(
     "--right", type=_PATH, metavar="FILE", help="the right eye, FILE is then the left: both go into the report"
 )
+@click.option(
+    "--advise", "wants_advice", is_flag=True, help="propose the next patches to measure; FILE may be left out"
+)
+@click.option("--accuracy", type=FiniteRange(min=0, min_open=True), help="with --advise: mean dE00 to reach")
+@click.option("--patches", type=click.IntRange(1, LARGEST), help="with --advise: propose so many")
 @observer_option
 @as_json
 def characterise(
-    file: Path, output: Path | None, model: str | None, report: Path | None, right: Path | None, observer: str,
-    json: bool, **given: Any,
+    file: Path | None, output: Path | None, model: str | None, report: Path | None, right: Path | None,
+    wants_advice: bool, accuracy: float | None, patches: int | None, observer: str, json: bool, **given: Any,
 ) -> None:  # fmt: skip
     """Choose a model for a display measured in FILE, by its error on colours held out.
 
-    FILE is Argyll's .ti3, or CSV: R,G,B,X,Y,Z or R,G,B,x,y,Y or rows Red, Green, Blue, White, Black.
+    FILE is Argyll's .ti3, or CSV: R,G,B,X,Y,Z or R,G,B,x,y,Y or R,G,B and a spectrum, or rows Red,
+    Green, Blue, White, Black. With --advise, say what to measure next and what that promises.
     """
+    if wants_advice:
+        if model is not None:
+            raise click.UsageError("--advise chooses the model itself; leave --model out")
+        _advise(None if file is None else read_measurements(file, observer), output, accuracy, patches, json)
+        return
+    if file is None:
+        raise click.UsageError("give a FILE of measurements, or --advise")
+    if accuracy is not None or patches is not None:
+        raise click.UsageError("--accuracy and --patches belong to --advise")
     if right is not None and report is None:
         raise DisplayError("--right is for a report of both eyes", remedy="give --report FILE.html as well")
     measured = read_measurements(file, observer)
@@ -70,16 +87,25 @@ def characterise(
         write_profile(profile, output)
         document["file"] = str(output)
         document["warnings"] += profile_warnings(profile, measured)
-    rows = []
-    for each in document["models"]:
-        held_out = each["held_out"] or {"mean": None, "p95": None, "max": None}
-        mark = "*" if each["name"] == document["model"] else ""
-        figures = [held_out[key] for key in ("mean", "p95", "max")] + [each["fit"]["mean"]]
-        rows.append(
-            [f"{each['name']} {mark}".strip(), *rounded(figures, 3), *rounded([each["nanoseconds_per_pixel"]], 0)]
-        )
-    columns = ("model (* chosen)", "held out: mean", "95 %", "max dE00", "fit: mean", "ns/pixel")
-    emit(document, json, lambda console: console.print(table(columns, rows)))
+    emit(document, json, lambda console: show_characterisation(console, document))
+
+
+def _advise(
+    measured: Measurements | None, output: Path | None, accuracy: float | None, patches: int | None, json: bool
+) -> None:
+    with progress_bar("simulating") as report:
+        found = advise(measured, accuracy, patches, report)
+    document = advice_document(found)
+    if output is not None:
+        if not len(found.codes):
+            raise DisplayError(
+                "there is nothing to measure: what is measured is enough", where=output, remedy=found.why
+            )
+        lines = ["R,G,B", *(",".join(repr(value) for value in row) for row in found.codes.tolist())]
+        with atomic_path(output) as temporary:
+            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        document["file"] = str(output)
+    emit(document, json, lambda console: show_advice(console, document))
 
 
 @click.command()

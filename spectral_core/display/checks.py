@@ -1,19 +1,27 @@
-"""What measurements say of a display before any model: additivity, black, noise, ramps."""
+"""What measurements say of a display before any model: one verdict a check."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spectral_core.arrays import Float64Array
-from spectral_core.display.measurements import SAME_CODE, Measurements
-from spectral_core.standards import XYZ_to_Lab, delta_E_2000
+from spectral_core.arrays import Float64Array, frozen
+from spectral_core.display.measurements import Measurements
+from spectral_core.display.repeats import clipping, drift, duplicates, instrument_noise, noise, reading_noise
+from spectral_core.display.verdicts import (
+    ADDITIVE_PERCENT,
+    Verdict,
+    mixes_add_up,
+    monotonic,
+    saturation,
+    untold,
+)
 
-# Channels that sum to within this of white are additive as far as instruments tell (1 % in Y).
-ADDITIVE = 0.02
-# A step down a ramp larger than this share of white is no noise.
-_RAMP_TOLERANCE = 2e-3
+# In percent of white: above it the contrast is below 100:1, which is stray light or a lifted black.
+# Black of the published headset is 0.4 %.
+_BLACK_PERCENT = 1.0
+_SPECTRA_DE00 = 1.0
 
 
 @dataclass(frozen=True)
@@ -29,7 +37,9 @@ class Checks:
     noise_dE00
         Mean dE00 of repeated patches from their mean, None without repeats.
     warnings
-        Verdicts worth a sentence.
+        What a user should know: the file's warnings and the advice of the checks that failed.
+    verdicts
+        Every check.
     """
 
     additivity_error: float
@@ -37,6 +47,7 @@ class Checks:
     black_share: float
     noise_dE00: float | None
     warnings: tuple[str, ...]
+    verdicts: tuple[Verdict, ...]
 
 
 def check(measured: Measurements) -> Checks:
@@ -45,37 +56,65 @@ def check(measured: Measurements) -> Checks:
     primaries = [measured.at(*np.eye(3)[index]) for index in range(3)]
     total = np.sum([each for each in primaries if each is not None], axis=0) - 2 * black
     additivity = np.asarray(total / white - 1)
+    black_share = float(black[1] / white[1])
+    relative = replace(measured, XYZ=frozen(measured.XYZ / white[1]))
+    noise_dE00, repeated = noise(relative), reading_noise(relative)
+    verdicts = (
+        _additivity(additivity),
+        *mixes_add_up(relative, repeated),
+        _black(measured, black_share),
+        monotonic(relative, None if repeated is None else 100 * repeated[0]),
+        saturation(relative),
+        instrument_noise(relative),
+        drift(relative),
+        duplicates(relative),
+        clipping(relative),
+        *_spectra(measured),
+    )
     warnings = list(measured.warnings)
-    if abs(additivity[1]) > ADDITIVE:
-        warnings.append(f"not additive: red, green and blue sum to {additivity[1]:+.1%} of white's luminance")
     if measured.at(0, 0, 0) is None:
         warnings.append("black was not measured and is taken as 0")
-    for index, name in enumerate(("red", "green", "blue", "grey")):
-        chosen = measured.grey if index == 3 else measured.channel(index)
-        warnings += _ramp_warnings(name, measured.subset(chosen), white[1])
-    return Checks(float(additivity[1]), additivity, float(black[1] / white[1]), noise(measured), tuple(warnings))
+    warnings += [each.advice for each in verdicts if each.passed is False]
+    return Checks(float(additivity[1]), additivity, black_share, noise_dE00, tuple(warnings), verdicts)
 
 
-def noise(measured: Measurements) -> float | None:
-    """Mean dE00 of repeated patches from their own mean; None if no patch was repeated."""
-    keys = np.round(measured.codes / SAME_CODE).astype(int)
-    _, group, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
-    group = group.ravel()
-    repeated = count[group] > 1
-    if not repeated.any():
-        return None
-    means = np.stack([np.bincount(group, measured.XYZ[:, axis]) / count for axis in range(3)], axis=1)
-    white = measured.white_XYZ
-    difference = delta_E_2000(XYZ_to_Lab(measured.XYZ[repeated], white), XYZ_to_Lab(means[group[repeated]], white))
-    return float(difference.mean())
+def _additivity(error: Float64Array) -> Verdict:
+    percent = float(100 * error[1])
+    passed = abs(percent) <= ADDITIVE_PERCENT
+    found = (
+        f"red, green and blue sum to {abs(percent):.1f} % {'more' if percent > 0 else 'less'} than white's luminance"
+    )
+    advice = found if passed else f"not additive: {found}; greys need curves of their own, mixes a correction"
+    return Verdict(
+        "additivity of white", percent, "% of white", ADDITIVE_PERCENT, "twice what instruments reproduce",
+        passed, advice, {"X_percent": float(100 * error[0]), "Z_percent": float(100 * error[2])},
+    )  # fmt: skip
 
 
-def _ramp_warnings(name: str, ramp: Measurements, white_Y: float) -> list[str]:
-    order = np.argsort(ramp.codes.max(axis=1), kind="stable")
-    Y = ramp.XYZ[order, 1]
-    codes = ramp.codes[order].max(axis=1)
-    drop = (np.maximum.accumulate(Y) - Y) / white_Y if len(Y) else np.zeros(0)
-    if not len(Y) or drop.max() <= _RAMP_TOLERANCE:
-        return []
-    at = int(drop.argmax())
-    return [f"the {name} ramp falls at code {codes[at]:.3f} by {drop[at]:.2%} of white"]
+def _black(measured: Measurements, share: float) -> Verdict:
+    name, unit = "black level", "% of white"
+    if measured.at(0, 0, 0) is None:
+        return untold(name, unit, "measure black (codes 0): without it black is taken as 0")
+    percent = 100 * share
+    passed = percent <= _BLACK_PERCENT
+    found = f"black is {percent:.2g} % of white, a contrast of {1 / share:.0f}:1" if share > 0 else "black reads 0"
+    advice = found if passed else f"{found}: keep stray light out, and let nothing lift the codes"
+    details = {"black_Y": float(measured.black_XYZ[1])}
+    return Verdict(name, percent, unit, _BLACK_PERCENT, "a contrast of 100:1", passed, advice, details)
+
+
+def _spectra(measured: Measurements) -> tuple[Verdict, ...]:
+    """The spectra against the instrument's own XYZ, where a file has both."""
+    found = measured.agreement
+    if found is None:
+        return ()
+    passed = found.mean_dE00 <= _SPECTRA_DE00
+    advice = f"the spectra's XYZ and the instrument's differ by dE00 {found.mean_dE00:.2f} on average"
+    advice += f", {found.max_dE00:.2f} at most" + ("" if passed else ": one of the two is not of these patches")
+    details = {"max_dE00": found.max_dE00, "max_percent": found.max_percent}
+    return (
+        Verdict(
+            "spectra against XYZ", found.mean_dE00, "dE00, mean", _SPECTRA_DE00, "just seen side by side",
+            passed, advice, details,
+        ),
+    )  # fmt: skip

@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from spectral_core import weights
 from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.display.cgats import parse_cgats
+from spectral_core.display.contradictions import refuse_contradictions
+from spectral_core.display.emission import Agreement, Emission, agreement, emission, wavelength
 from spectral_core.display.state import iso_date
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
@@ -47,6 +48,8 @@ class Measurements:
         When it was measured, ISO 8601; None if the file does not say.
     white_luminance_cd_m2
         Of white, where the file says it although its unit is relative.
+    agreement
+        Of spectra with the instrument's XYZ, where the file has both.
     """
 
     codes: Float64Array
@@ -56,6 +59,7 @@ class Measurements:
     warnings: tuple[str, ...] = ()
     date: str | None = None
     white_luminance_cd_m2: float | None = None
+    agreement: Agreement | None = None
 
     def subset(self, chosen: BoolArray | np.ndarray) -> Measurements:  # type: ignore[type-arg]
         """The patches of a mask or of indices."""
@@ -98,41 +102,69 @@ class Measurements:
 def read_measurements(path: str | Path, observer: str = DEFAULT_OBSERVER) -> Measurements:
     """Read ``.ti3``, CSV with ``R,G,B,X,Y,Z`` or ``R,G,B,x,y,Y``, or CSV with named rows (Red, ...).
 
+    Spectral columns (``SPEC_380`` ... or ``380`` ...) may follow, or stand instead of XYZ. The
+    instrument's XYZ are used where there are any, unless another observer is asked for.
+
     Raises
     ------
     DisplayError
-        If the file is none of these, lacks white or a primary, or contradicts itself.
+        If the file is none of these, lacks white or a primary, or contradicts itself; if it lacks the
+        spectra that an observer other than the default needs.
     """
     path = Path(path)
     text = read_text(path, DisplayError, "give a .ti3 or CSV of measurements")
-    measured = _from_cgats(text, path, observer) if "BEGIN_DATA_FORMAT" in text else _from_csv(text, path)
-    _refuse_contradictions(measured, path)
+    measured, spectra = _from_cgats(text, path) if "BEGIN_DATA_FORMAT" in text else _from_csv(text, path)
+    if spectra is not None:
+        measured = _with_spectra(measured, spectra, observer, path)
+    elif observer != DEFAULT_OBSERVER:
+        raise DisplayError(
+            f"holds no spectra, so that {observer} cannot be applied",
+            where=path,
+            remedy="leave --observer out: X, Y, Z are the instrument's own",
+        )
+    refuse_contradictions(measured, path)
     return measured
 
 
-def _from_cgats(text: str, path: Path, observer: str) -> Measurements:
+def _with_spectra(measured: Measurements, spectra: Emission, observer: str, path: Path) -> Measurements:
+    """XYZ by another observer, or where the instrument gave none; else the agreement of the two."""
+    spectral, by_default = spectra.XYZ(observer), spectra.XYZ()
+    white = int(by_default[:, 1].argmax())
+    if not by_default[white, 1] > 0:
+        raise DisplayError("its spectra hold no light", where=path, remedy="measure again")
+    warnings = (*measured.warnings, *spectra.warnings)
+    if not len(measured.XYZ):
+        return replace(measured, XYZ=frozen(100 * spectral / spectral[white, 1]), unit="relative", warnings=warnings)
+    if not measured.XYZ[white, 1] > 0:
+        raise DisplayError(f"patch {white + 1} has a spectrum but no luminance", where=path, remedy="correct the row")
+    found = agreement(measured.XYZ, by_default, white)
+    measured = replace(measured, warnings=warnings, agreement=found)
+    if observer == DEFAULT_OBSERVER:
+        return measured
+    # Luminance belongs to the default observer: white keeps what the instrument says.
+    scaled = spectral * (measured.XYZ[white, 1] / spectral[white, 1])
+    note = f"X, Y, Z are integrated from the spectra with {observer}; the instrument's own are not used"
+    return replace(measured, XYZ=frozen(scaled), warnings=(*warnings, note))
+
+
+def _from_cgats(text: str, path: Path) -> tuple[Measurements, Emission | None]:
     table = parse_cgats(text, path)
     codes = table.stacked(("RGB_R", "RGB_G", "RGB_B"))
     XYZ = table.stacked(("XYZ_X", "XYZ_Y", "XYZ_Z"))
-    warnings: list[str] = []
-    from_spectra = _spectral_XYZ(table.columns, observer)
-    if codes is None or (XYZ is None and from_spectra is None):
+    names = [name for name in table.columns if name.startswith("SPEC_")]
+    spectra = emission(names, [table.columns[name] for name in names], path)
+    if codes is None or (XYZ is None and spectra is None):
         raise DisplayError("lacks RGB_R... or XYZ_X... columns", where=path, remedy="give a .ti3 of a display")
-    if XYZ is None:
-        assert from_spectra is not None
-        XYZ = from_spectra
-    elif from_spectra is not None:
-        warnings += _disagreement(XYZ, from_spectra)
     relative = table.keywords.get("NORMALIZED_TO_Y_100", "NO").upper() == "YES"
-    return Measurements(
+    measured = Measurements(
         frozen(codes / 100),
-        frozen(XYZ),
+        frozen(np.zeros((0, 3)) if XYZ is None else XYZ),
         "relative" if relative else "cd/m2",
         table.keywords.get("TARGET_INSTRUMENT", ""),
-        tuple(warnings),
-        iso_date(table.keywords.get("CREATED", "")),
-        _stated_luminance(table.keywords.get("LUMINANCE_XYZ_CDM2", "")) if relative else None,
+        date=iso_date(table.keywords.get("CREATED", "")),
+        white_luminance_cd_m2=_stated_luminance(table.keywords.get("LUMINANCE_XYZ_CDM2", "")) if relative else None,
     )
+    return measured, spectra
 
 
 def _stated_luminance(text: str) -> float | None:
@@ -144,26 +176,7 @@ def _stated_luminance(text: str) -> float | None:
     return luminance if 0 < luminance < math.inf else None
 
 
-def _spectral_XYZ(columns: dict[str, Float64Array], observer: str) -> Float64Array | None:
-    """XYZ (n, 3) of emission spectra, white at Y = 100; None without spectra."""
-    names = [name for name in columns if name.startswith("SPEC_")]
-    if len(names) < 3:
-        return None
-    nm = np.array([float(name.removeprefix("SPEC_")) for name in names])
-    order = np.argsort(nm)
-    power = np.stack([columns[names[index]] for index in order], axis=1)
-    XYZ = (power * weights.quadrature_widths(nm[order])) @ weights.colour_matching(nm[order], observer)
-    return np.asarray(100 * XYZ / XYZ[:, 1].max())
-
-
-def _disagreement(XYZ: Float64Array, spectral: Float64Array) -> list[str]:
-    """One warning if the instrument's XYZ and its spectra differ by more than rounding."""
-    scaled = spectral * (XYZ[:, 1].max() / spectral[:, 1].max())
-    worst = float(np.abs(scaled - XYZ).max() / XYZ[:, 1].max())
-    return [f"the instrument's XYZ and its spectra differ by up to {worst:.2%} of white"] if worst > 1e-3 else []
-
-
-def _from_csv(text: str, path: Path) -> Measurements:
+def _from_csv(text: str, path: Path) -> tuple[Measurements, Emission | None]:
     lines = [
         (number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
     ]
@@ -181,17 +194,31 @@ def _from_csv(text: str, path: Path) -> Measurements:
                 remedy="correct the row",
             )
     if header[0].casefold() in ("color", "colour", "channel", "name", "patch"):
-        return _named_rows(header, body, path)
-    if header[:3] != ["R", "G", "B"] or header[3:6] not in (["X", "Y", "Z"], ["x", "y", "Y"]):
+        return _named_rows(header, body, path), None
+    return _code_rows(header, body, path)
+
+
+def _code_rows(
+    header: list[str], body: list[tuple[int, list[str]]], path: Path
+) -> tuple[Measurements, Emission | None]:
+    """Rows of codes with X, Y, Z or x, y, Y or a spectrum; the other columns do not count."""
+    colour = header[3:6] if header[3:6] in (["X", "Y", "Z"], ["x", "y", "Y"]) else []
+    bands = [index for index in range(3 + len(colour), len(header)) if wavelength(header[index]) is not None]
+    used = [*range(3 + len(colour)), *bands]
+    usable = header[:3] == ["R", "G", "B"]
+    table = np.array([[_value(row[index], path, number) for index in used] for number, row in body if usable])
+    spectra = emission([header[index] for index in bands], list(table.T[3 + len(colour) :]), path) if usable else None
+    if not usable or not (colour or spectra):
         raise DisplayError(
             f"the header is {','.join(header[:6])}",
             where=path,
-            remedy="give R,G,B,X,Y,Z or R,G,B,x,y,Y, or named rows with L,x,y",
+            remedy="give R,G,B,X,Y,Z or R,G,B,x,y,Y or R,G,B,380,385,..., or named rows with L,x,y",
         )
-    table = np.array([[_value(cell, path, number) for cell in row[:6]] for number, row in body])
     codes = table[:, :3] / (255.0 if table[:, :3].max() > 1 else 1.0)
-    XYZ = table[:, 3:] if header[3] == "X" else _xyY_to_XYZ(table[:, 3:], path)
-    return Measurements(frozen(codes), frozen(XYZ), "relative" if abs(XYZ[:, 1].max() - 100) < 1 else "cd/m2")
+    XYZ = table[:, 3:6] if colour else np.zeros((0, 3))
+    XYZ = _xyY_to_XYZ(XYZ, path) if colour[:1] == ["x"] else XYZ
+    relative = not colour or abs(XYZ[:, 1].max() - 100) < 1
+    return Measurements(frozen(codes), frozen(XYZ), "relative" if relative else "cd/m2"), spectra
 
 
 def _named_rows(header: list[str], body: list[tuple[int, list[str]]], path: Path) -> Measurements:
@@ -237,25 +264,3 @@ def _value(cell: str, path: Path, number: int) -> float:
     if not math.isfinite(value):
         raise DisplayError(f"'{cell}' is no finite number", where=f"{path}, line {number}", remedy="correct the cell")
     return value
-
-
-def _refuse_contradictions(measured: Measurements, path: Path) -> None:
-    if (measured.codes < 0).any() or (measured.codes > 1 + SAME_CODE).any():
-        raise DisplayError("device codes outside 0..1 (or 0..255)", where=path, remedy="state codes 0..1 or 0..255")
-    for name in ("white", "red", "green", "blue"):
-        XYZ = measured.at(*_NAMED_CODES[name])
-        if XYZ is None:
-            raise DisplayError(
-                f"full {name} was not measured",
-                where=path,
-                remedy="measure white and the three primaries at full drive",
-            )
-        if not XYZ[1] > 0 or (name == "white" and not (XYZ > 0).all()):
-            raise DisplayError(f"full {name} reads {XYZ.tolist()}, not above 0", where=path, remedy="measure it again")
-        if name != "white" and XYZ[1] > measured.white_XYZ[1]:
-            raise DisplayError(
-                f"{name} ({XYZ[1]:.4g}) is brighter than white ({measured.white_XYZ[1]:.4g}): "
-                "the readings contradict each other",
-                where=path,
-                remedy="measure again with the display's state fixed",
-            )

@@ -10,10 +10,10 @@ from typing import Any
 
 import spectral_core
 from spectral_core.display.characterise import Characterisation
-from spectral_core.display.checks import ADDITIVE
 from spectral_core.display.coverage import XYZ_to_xy, xy_to_uv
 from spectral_core.display.eyes import eye_difference
 from spectral_core.display.measurements import Measurements
+from spectral_core.display.verdicts import ADDITIVE_PERCENT
 from spectral_core.report import display_findings, display_plots, display_tables
 from spectral_core.report.display_data import DARK_GREY, held_out, ramps, visible_greys
 from spectral_core.report.extras import extra
@@ -101,7 +101,7 @@ def _eye(eye: Eye) -> dict[str, Any]:
         "unit": read.unit,
         "patches": len(read.codes),
         "mixed": int(read.mixed.sum()),
-        "additive": abs(found.checks.additivity_error) <= ADDITIVE,
+        "additive": abs(100 * found.checks.additivity_error) <= ADDITIVE_PERCENT,
         "left_out": len(read.codes) - len(found.measured.codes),
         "chosen": found.chosen,
         "tested": len(found.chosen.held_out_errors),

@@ -10,6 +10,7 @@ from spectral_core.display.characterise import characterise
 from spectral_core.display.checks import check
 from spectral_core.display.measurements import read_measurements
 from spectral_core.errors import DisplayError
+from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 
 @pytest.mark.parametrize(
@@ -40,3 +41,29 @@ def test_a_desktop_display_on_held_out_colours(measured_data: Path, file: str) -
     assert held_out is not None
     assert held_out.mean <= 0.17
     assert held_out.p95 <= 0.40
+
+
+@pytest.mark.parametrize("file", ["2022-03-20_i1DisplayPro_175patch", "2022-03-23_i1Pro2_175patch_spectral"])
+def test_a_good_desktop_display_passes_every_check(measured_data: Path, file: str) -> None:
+    found = check(read_measurements(measured_data / f"displays/UP2516D_{file}.ti3"))
+    assert [each.name for each in found.verdicts if each.passed is not True] == []
+    assert found.warnings == ()
+
+
+def test_spectra_and_instrument_agree(measured_data: Path) -> None:
+    """An i1 Pro 2 integrates its own spectra, over its own wavelengths: 0.1 dE00 is rounding of 3.3 nm to 3."""
+    path = measured_data / "displays/UP2516D_2022-03-23_i1Pro2_175patch_spectral.ti3"
+    found = read_measurements(path)
+    assert found.agreement is not None
+    assert found.agreement.mean_dE00 < 0.1
+    assert found.agreement.max_dE00 < 0.2
+    wide = read_measurements(path, "cie1964-10")
+    assert wide.white_XYZ[1] == pytest.approx(found.white_XYZ[1], rel=1e-3)  # four whites, one of them scaled to
+    difference = delta_E_2000(XYZ_to_Lab(wide.XYZ, wide.white_XYZ), XYZ_to_Lab(found.XYZ, found.white_XYZ))
+    assert difference.max() > 1  # another observer sees other colours
+    assert any("cie1964-10" in each for each in wide.warnings)
+
+
+def test_an_observer_needs_spectra(measured_data: Path) -> None:
+    with pytest.raises(DisplayError, match="holds no spectra"):
+        read_measurements(measured_data / "displays/UP2516D_2022-03-20_i1DisplayPro_175patch.ti3", "cie2015-2")
