@@ -13,6 +13,7 @@ import numpy as np
 from spectral_core.arrays import Float64Array
 from spectral_core.cli.console import emit, rounded, table
 from spectral_core.cli.options import as_json, observer_option, profile_option
+from spectral_core.cli.profile import profile as profile_group
 from spectral_core.display import DisplayProfile, load_profile, write_profile
 from spectral_core.display.characterise import characterise as choose
 from spectral_core.display.fitting import MODEL_KINDS
@@ -90,6 +91,7 @@ def add_display_commands(group: click.Group) -> None:
     """Add this module's commands to the program."""
     group.add_command(characterise)
     group.add_command(convert)
+    group.add_command(profile_group)
 
 
 def _read(file: Path | None, header: list[str]) -> Float64Array:
