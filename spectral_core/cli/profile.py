@@ -11,6 +11,7 @@ import click
 import numpy as np
 
 from spectral_core.cli.console import Document, emit, facts
+from spectral_core.cli.export import export
 from spectral_core.cli.options import FiniteRange, as_json
 from spectral_core.display import DisplayProfile, load_profile, write_profile
 from spectral_core.display.chromaticities import xy
@@ -102,7 +103,7 @@ def profile_warnings(profile: DisplayProfile, measured: Measurements) -> list[st
 
 @click.group()
 def profile() -> None:
-    """Look into display profiles and set what they keep."""
+    """Look into display profiles, set what they keep, and write them for other programs."""
 
 
 @profile.command("show")
@@ -231,4 +232,5 @@ def _told(document: Document) -> dict[str, str]:
 
 def add_profile_commands(group: click.Group) -> None:
     """Add this module's commands to the program."""
+    profile.add_command(export)
     group.add_command(profile)

@@ -1,5 +1,21 @@
-"""A display profile for other programs: OpenColorIO, .cube, ICC; each written file is read back by another."""
+"""A display profile for other programs: OpenColorIO, .cube, ICC; what is written is read back by another."""
 
+from spectral_core.display.export.cube import CubeInput, export_cube
+from spectral_core.display.export.icc import export_icc
+from spectral_core.display.export.names import export_name
 from spectral_core.display.export.ocio import OcioExport, blender_config, export_ocio
+from spectral_core.display.export.read_back import ReadBack, read_back_cube, read_back_icc, read_back_ocio
 
-__all__ = ["OcioExport", "blender_config", "export_ocio"]
+__all__ = [
+    "CubeInput",
+    "OcioExport",
+    "ReadBack",
+    "blender_config",
+    "export_cube",
+    "export_icc",
+    "export_name",
+    "export_ocio",
+    "read_back_cube",
+    "read_back_icc",
+    "read_back_ocio",
+]

@@ -9,6 +9,7 @@ The config is text that is edited, not parsed: comments and everything of Blende
 
 from __future__ import annotations
 
+import hashlib
 import importlib.util
 import os
 import re
@@ -31,8 +32,10 @@ VIEW = "Standard"
 _MARK = "# Made by Spectral Booth from"
 _REMEDY = "give Blender's own config.ocio (in its folder datafiles/colormanagement)"
 _CURVE_NODES = 4096
-# Twice the nodes a side cost eight times the memory of a graphics card: 3.3 MB here.
-TABLE_NODES = 65
+# Twice the nodes a side halve the error and take eight times the memory of a graphics card: 3.3 MB here.
+_TABLE_NODES = 65
+# OpenColorIO keeps a file that it has read once: another content must have another name.
+_OWN_TABLE = re.compile(r".+ (curves|interaction) [0-9a-f]{8}\.(spi1d|cube)")
 
 
 @dataclass(frozen=True)
@@ -79,10 +82,14 @@ def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport
     display = _free_name(export_name(profile), text)
     steps = stages(profile.model)
     files = [_copied(source, folder / path / source.name) for path in paths for source in _files(base.parent / path)]
-    luts, transforms = _written(steps, folder / paths[0], export_name(profile))
+    tables = folder / ("luts" if "luts" in paths else paths[0])
+    luts, transforms = _written(steps, tables, display)
     edited = _with_display(text, base, display, transforms)
     with atomic_path(config) as temporary:
         temporary.write_text(edited, encoding="utf-8")
+    for path in _files(tables):
+        if _OWN_TABLE.fullmatch(path.name) and path.name not in edited:
+            path.unlink()
     return OcioExport(config, display, VIEW, (config, *luts, *files))
 
 
@@ -131,19 +138,20 @@ def _written(steps: Stages, folder: Path, name: str) -> tuple[list[Path], list[s
     if isinstance(interaction := steps.interaction, Interaction):
         low, high = interaction.span
         scale = 1 / (high - low)
-        files.append(folder / f"{name} interaction.cube")
-        write_cube(files[-1], interaction.sampled(TABLE_NODES), (f"Own lightness of drive: {name}",))
-        # CIE 1976 lightness is this function with these numbers; mirrored, as the model's is.
+        table = interaction.sampled(_TABLE_NODES)
+        files.append(folder / f"{name} interaction {_digest(table)}.cube")
+        write_cube(files[-1], table, (f"Own lightness of drive: {name}",))
+        # CIE 1976 lightness is this function with these numbers, below zero too.
         transforms += [
-            "!<ExponentWithLinearTransform> {gamma: [3, 3, 3, 1], offset: [0.16, 0.16, 0.16, 0], style: mirror, "
-            "direction: inverse}",
+            "!<ExponentWithLinearTransform> {gamma: 3, offset: 0.16, direction: inverse}",
             _matrix(np.diag(scale), -low * scale),
             _file(files[-1], "tetrahedral"),
         ]
     transforms.append(_CLAMP)
     if isinstance(curve := steps.curve, Tables):
-        files.append(folder / f"{name} curves.spi1d")
-        write_spi1d(files[-1], curve.sampled(_CURVE_NODES))
+        codes = curve.sampled(_CURVE_NODES)
+        files.append(folder / f"{name} curves {_digest(codes)}.spi1d")
+        write_spi1d(files[-1], codes)
         transforms += [_power(np.full(3, 1 / SHAPER)), _file(files[-1], "linear")]
     elif isinstance(curve, Power):
         transforms.append(_power(curve.gamma))
@@ -152,6 +160,10 @@ def _written(steps: Stages, folder: Path, name: str) -> tuple[list[Path], list[s
     else:
         transforms.append("!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, direction: inverse}")
     return files, transforms
+
+
+def _digest(values: Float64Array) -> str:
+    return hashlib.sha256(values.tobytes()).hexdigest()[:8]
 
 
 _CLAMP = "!<RangeTransform> {min_in_value: 0, max_in_value: 1, min_out_value: 0, max_out_value: 1}"
