@@ -29,28 +29,28 @@ RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 # Over 9 nodes a simulated OLED's mean error grows by 0.02 dE00, over 13 by less than 0.01.
 NODES = 13
 # CIE 015:2018, 8.2.1.1: below this share of white, lightness is a line.
-_TOE, _TOE_SLOPE, _TOE_LIGHTNESS = (6 / 29) ** 3, (29 / 3) ** 3 / 100, 0.08
+TOE, TOE_SLOPE, TOE_LIGHTNESS = (6 / 29) ** 3, (29 / 3) ** 3 / 100, 0.08
 
 
 def lightness(drive: FloatArray) -> Float64Array:
     """CIE 1976 lightness, 0 to 1, of linear drive; its line goes on below zero."""
     # Each branch runs on what it is for, and their sum needs no choice: they meet at the toe.
-    result: Float64Array = np.maximum(drive, _TOE)
+    result: Float64Array = np.maximum(drive, TOE)
     np.power(result, 1 / 3, out=result)
     result *= 1.16
     result -= 0.16
-    result += _TOE_SLOPE * (np.minimum(drive, _TOE) - _TOE)
+    result += TOE_SLOPE * (np.minimum(drive, TOE) - TOE)
     return result
 
 
 def drive_of_lightness(values: FloatArray) -> Float64Array:
     """The inverse of `lightness`."""
-    root: Float64Array = np.maximum(values, _TOE_LIGHTNESS)
+    root: Float64Array = np.maximum(values, TOE_LIGHTNESS)
     root += 0.16
     root /= 1.16
     result = root * root
     result *= root
-    result += (np.minimum(values, _TOE_LIGHTNESS) - _TOE_LIGHTNESS) / _TOE_SLOPE
+    result += (np.minimum(values, TOE_LIGHTNESS) - TOE_LIGHTNESS) / TOE_SLOPE
     return result
 
 
