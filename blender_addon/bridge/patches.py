@@ -57,7 +57,7 @@ _HEADSET = {
     "show_annotation": False,
     "show_selection": False,
     "show_controllers": False,
-    "show_custom_overlays": False,
+    "show_custom_overlays": True,  # the frames are counted as one
     "show_object_extras": False,
     "viewfinder_enabled": False,
     "show_object_viewport_mesh": True,

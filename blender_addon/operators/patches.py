@@ -168,7 +168,12 @@ class PlayPatches(bpy.types.Operator):
             playback.write_state(self._playback.document(now), self._folder)
             self.report({"INFO"}, f"{self._playback.ended.capitalize()}; what was shown is in {path}")
         if self.quit:
-            bpy.ops.wm.quit_blender()
+            bpy.app.timers.register(_quit)  # once this operator is over
+
+
+def _quit() -> None:
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+        bpy.ops.wm.quit_blender()
 
 
 def _folder(name: str) -> Path:

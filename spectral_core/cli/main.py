@@ -15,6 +15,7 @@ from spectral_core.cli.blender import add_blender_commands
 from spectral_core.cli.console import cell, emit, facts, progress_bar, rounded, table
 from spectral_core.cli.display import add_display_commands
 from spectral_core.cli.options import FiniteRange, as_json, light_option, observer_option, profile_option
+from spectral_core.cli.patches import add_patch_commands
 from spectral_core.display import load_profile
 from spectral_core.errors import LightError, SpectralBoothError
 from spectral_core.imaging import IMAGE_FORMATS
@@ -171,6 +172,7 @@ def bake_command(
 
 
 add_display_commands(cli)
+add_patch_commands(cli)
 add_blender_commands(cli)
 
 
@@ -196,4 +198,3 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _refuse(message: str) -> int:
     print(f"error: {' '.join(message.split())}", file=sys.stderr)
     return 2
-

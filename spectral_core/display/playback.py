@@ -91,8 +91,12 @@ class Playback:
         return self.showings[-1].patch
 
     def state(self, now: float) -> str:
-        """``settling``, ``ready``, or at the end ``done`` or ``stopped``."""
-        return self.ended or ("ready" if now >= self.showings[-1].ready else "settling")
+        """``drawing``, ``settling``, ``ready``, or at the end ``done`` or ``stopped``."""
+        if self.ended:
+            return self.ended
+        if self.showings[-1].shown is None:
+            return "drawing"
+        return "ready" if now >= self.showings[-1].ready else "settling"
 
     def drawn(self, now: float) -> None:
         """The patch stands on the display: from now on it settles."""
