@@ -156,7 +156,8 @@ def counting_frames(scene: bpy.types.Scene) -> Iterator[FrameCounts]:
     counts, name, space = FrameCounts(), scene.name, bpy.types.SpaceView3D
 
     def drawn(region: str) -> None:
-        if bpy.context.scene is None or bpy.context.scene.name == name:
+        ours = bpy.context.scene is None or bpy.context.scene.name == name
+        if ours and not bpy.app.is_job_running("SHADER_COMPILATION"):  # nothing is seen until it is over
             setattr(counts, region, getattr(counts, region) + 1)
 
     handles = [(space.draw_handler_add(drawn, ("window",), "WINDOW", "POST_PIXEL"), "WINDOW")]

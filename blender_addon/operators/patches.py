@@ -199,6 +199,11 @@ def _view(context: bpy.types.Context) -> tuple[bpy.types.Window, bpy.types.Area]
 
 def _say(workspace: str, text: str) -> None:
     """In the panel, and in the status bar with the keys."""
-    bpy.context.window_manager.spectral_booth_player = text
+    manager = bpy.context.window_manager
+    manager.spectral_booth_player = text
     keys = ". Space or right: next, left: back, Esc: stop"
     bpy.data.workspaces[workspace].status_text_set(text + keys if text else None)
+    for area in (area for window in manager.windows for area in window.screen.areas if area.type == "VIEW_3D"):
+        for region in area.regions:
+            if region.type == "UI":  # nothing else tells the sidebar
+                region.tag_redraw()

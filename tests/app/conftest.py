@@ -9,9 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from real_blender import PROJECT, WORK, Application, assert_clean
-
-APPLICATION = Path(__file__).with_name("application.sh")
+from real_blender import APPLICATION, PROJECT, WORK, Application, assert_clean
 
 
 @pytest.fixture(scope="session")

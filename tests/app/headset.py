@@ -46,6 +46,8 @@ def steps(found: dict[str, object]) -> Iterator[None]:
         )  # fmt: skip
     instrument = subprocess.Popen([sys.executable, str(Path(__file__).with_name("instrument.py")), str(FOLDER)])
     found["playing"] = []
+    region = view["region"]
+    found["middle"] = [region.x + region.width // 2, view["window"].height - region.y - region.height // 2]
     while instrument.poll() is None:
         found["playing"].append(_playing())
         yield
@@ -86,7 +88,6 @@ def _playing() -> dict[str, object]:
     state = bpy.context.window_manager.xr_session_state
     return {
         "headset": _session(),
-        "compiling": bpy.app.is_job_running("SHADER_COMPILATION"),
         "head": None if state is None else list(state.viewer_pose_location),
         "panel": bpy.context.window_manager.spectral_booth_player,
     }

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 PROJECT = Path(__file__).parents[2]
+APPLICATION = Path(__file__).with_name("application.sh")
 # Below the project, which is the one folder that the application sees under the same path.
 WORK = PROJECT / "out" / "app"
 # Blender's own extension manager says it where a package of its own is missing; no add-on is concerned.

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO
 import pytest
-from real_blender import WORK, Application, assert_clean
+from real_blender import APPLICATION, PROJECT, WORK, Application, assert_clean
 
 FOLDER = WORK / "headset"
 # Blender's window begins here, see application.sh: the headset's picture is left of it.
@@ -48,7 +52,7 @@ def eyes(session: dict) -> np.ndarray:
     found = np.full((len(CODES), 2, 3), np.nan)
     spread = 0.0
     for index, code in enumerate(CODES):
-        picture = _photograph(FOLDER / f"{index + 1:03}.png")
+        picture = _photograph(index)[:, :_HEADSET_PIXELS]
         if not any(code):
             assert picture.max() == 0  # and there is no patch to be found
             found[index] = 0
@@ -62,10 +66,10 @@ def eyes(session: dict) -> np.ndarray:
     return found
 
 
-def _photograph(path: Path) -> np.ndarray:
-    """The headset's part of the screen (height, width, 3), 0..255."""
-    pixels = OpenImageIO.ImageBuf(str(path)).get_pixels(OpenImageIO.UINT8)
-    return np.asarray(pixels)[:, :_HEADSET_PIXELS, :3].astype(np.float64)
+def _photograph(index: int) -> np.ndarray:
+    """The whole screen (height, width, 3), 0..255, while patch `index` (from 0) was shown."""
+    pixels = OpenImageIO.ImageBuf(str(FOLDER / f"{index + 1:03}.png")).get_pixels(OpenImageIO.UINT8)
+    return np.asarray(pixels)[..., :3].astype(np.float64)
 
 
 def _patches(picture: np.ndarray) -> list[np.ndarray]:
@@ -93,6 +97,14 @@ def test_each_code_arrives_in_both_eyes_within_one_level(eyes: np.ndarray) -> No
     assert difference.max() <= 1.0
 
 
+def test_each_code_arrives_in_the_window_too(session: dict) -> None:
+    x, y = session["middle"]
+    x += _HEADSET_PIXELS
+    for index, code in enumerate(CODES):
+        middle = _photograph(index)[y - 40 : y + 40, x - 40 : x + 40]
+        assert np.abs(middle - code).max() <= 1.0, code
+
+
 def test_the_headset_ran_and_the_head_moved(session: dict) -> None:
     heads = [each["head"] for each in session["playing"] if each["headset"]]
     assert len(heads) > len(CODES)
@@ -111,6 +123,45 @@ def test_the_list_of_what_was_shown_pairs_with_the_readings(session: dict, tmp_p
     readings = tmp_path / "readings.csv"
     readings.write_text("X,Y,Z\n" + "1,1,1\n" * len(CODES), encoding="utf-8")
     assert len(pair(shown, readings).rows) == len(CODES)
+
+
+def test_the_command_plays_a_list_in_the_window(application: Application, installed: Path) -> None:
+    # The command starts what BLENDER names: here the application as these tests know it.
+    own = os.environ.get("BLENDER")
+    blender = WORK / "blender.sh"
+    blender.write_text(
+        f"#!/bin/sh\n{f'export BLENDER={shlex.quote(own)}' if own else 'unset BLENDER'}\n"
+        f'exec bash {shlex.quote(str(APPLICATION))} window "$@"\n',
+        encoding="utf-8",
+    )
+    blender.chmod(0o755)
+    folder = WORK / "command"
+    patches = _command(blender, "play", FOLDER / "nowhere.csv", "-o", folder)
+    assert (patches.returncode, "nowhere.csv: no such file" in patches.stderr) == (2, True)
+    three = WORK / "three.csv"
+    three.write_text("R,G,B\n1,0,0\n0,1,0\n0,0,1\n", encoding="utf-8")
+    patches = _command(blender, "play", three, "-o", folder, "--advance", "timer", "--seconds", "0.1", "--json")
+    assert patches.returncode == 0, patches.stderr
+    assert json.loads(patches.stdout) == {
+        "state": "done", "patches": 3, "last": 3, "shown": str(folder / "patches-shown.csv"),
+    }  # fmt: skip
+    assert len((folder / "patches-shown.csv").read_text(encoding="utf-8").splitlines()) == 4
+    patches = _command(blender, "play", three, "-o", three / "below")
+    assert patches.returncode == 2, patches.stderr
+    assert patches.stderr.startswith("error: ")
+    assert "Traceback" not in patches.stderr
+
+
+def _command(blender: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "spectral_core.cli", "patches", *map(str, arguments)],
+        cwd=PROJECT,
+        env={**os.environ, "BLENDER": str(blender), "BLENDER_USER_RESOURCES": str(WORK / "user")},
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+    )
 
 
 def test_keys_step_forward_and_back_and_stop(session: dict) -> None:
