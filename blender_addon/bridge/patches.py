@@ -123,7 +123,7 @@ def shown_in(window: bpy.types.Window, area: bpy.types.Area, scene: bpy.types.Sc
     user, layer = window.scene, window.view_layer.name
     window.scene = scene
     try:
-        with _settings(space, _VIEW_3D):
+        with _settings(space, _VIEW_3D, _place(window, area)):
             yield
     finally:
         window.scene = user
@@ -143,7 +143,7 @@ def in_headset(window: bpy.types.Window, area: bpy.types.Area, start: bool) -> I
     if started:
         _toggle_headset(window, area)
     try:
-        with _settings(settings, _HEADSET):
+        with _settings(settings, _HEADSET, _place(window, area)):
             yield
     finally:
         if started and window.id_data.xr_session_state is not None:
@@ -203,9 +203,8 @@ def follow_headset(scene: bpy.types.Scene) -> None:
 
 
 def _toggle_headset(window: bpy.types.Window, area: bpy.types.Area) -> None:
-    region = next(each for each in area.regions if each.type == "WINDOW")
     try:
-        with bpy.context.temp_override(window=window, area=area, region=region):
+        with bpy.context.temp_override(**_place(window, area)):
             bpy.ops.wm.xr_session_toggle()
     except RuntimeError as error:
         raise BlenderError(
@@ -300,20 +299,31 @@ def _remove() -> None:
     data.batch_remove([each for kind in kinds for each in kind if KEY in each])
 
 
+def _place(window: bpy.types.Window, area: bpy.types.Area) -> dict[str, object]:
+    """The context of a 3D view."""
+    return {"window": window, "area": area, "region": next(each for each in area.regions if each.type == "WINDOW")}
+
+
 @contextmanager
-def _settings(owner: object, values: dict[str, Any]) -> Iterator[None]:
-    """Attributes (``part.name``) set for the block; those that this Blender lacks are left out."""
+def _settings(owner: object, values: dict[str, Any], place: dict[str, object]) -> Iterator[None]:
+    """Attributes (``part.name``) set for the block; those that this Blender lacks are left out.
+
+    Both happen in the context of their 3D view: Blender crashes if a region is hidden or shown
+    while the context has no area, as in a timer.
+    """
     kept = []
     try:
-        for path, value in values.items():
-            *parts, name = path.split(".")
-            part = owner
-            for each in parts:
-                part = getattr(part, each)
-            if hasattr(part, name):
-                kept.append((part, name, getattr(part, name)))
-                setattr(part, name, value)
+        with bpy.context.temp_override(**place):
+            for path, value in values.items():
+                *parts, name = path.split(".")
+                part = owner
+                for each in parts:
+                    part = getattr(part, each)
+                if hasattr(part, name):
+                    kept.append((part, name, getattr(part, name)))
+                    setattr(part, name, value)
         yield
     finally:
-        for part, name, value in reversed(kept):
-            setattr(part, name, value)
+        with bpy.context.temp_override(**place):
+            for part, name, value in reversed(kept):
+                setattr(part, name, value)

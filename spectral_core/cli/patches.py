@@ -85,13 +85,13 @@ def play(
         "settle": settle,
         "warm_up": warm_up,
     }
-    state = output / playback.STATE_FILE
-    state.unlink(missing_ok=True)  # of an earlier run
+    # Over the state of an earlier run, and a folder that cannot be written to is told now.
+    playback.write_state({"format": 1, "state": "starting"}, output)
     with progress_bar(f"showing {count} patches"):
         run_in_window(_SCRIPT.format(options=options), blend)
-    if not state.exists():
-        raise BlenderError("Blender ended before it showed a patch", remedy="run it again")
-    last = json_module.loads(read_text(state, DisplayError, "play the patches again"))
+    last = json_module.loads(read_text(output / playback.STATE_FILE, DisplayError, "play the patches again"))
+    if last["state"] not in ("done", "stopped"):
+        raise BlenderError("Blender ended before the patches did", remedy="play them again")
     document: Document = {
         "state": last["state"],
         "patches": count,

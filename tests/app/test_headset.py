@@ -171,7 +171,7 @@ def test_keys_step_forward_and_back_and_stop(session: dict) -> None:
 
 def test_all_is_as_before_and_undo_knows_nothing_of_it(session: dict) -> None:
     assert session["before"]["panel"] == ""
-    assert {each["panel"][:5] for each in session["playing"]} == {"Patch"}
+    assert session["playing"][0]["panel"].startswith("Patch 1 of 20")
     # The runtime's session begins with the 3D view's shading, whoever starts it.
     for state in (session["before"], session["after"], session["after_keys"]):
         del state["headset"][2]

@@ -291,6 +291,10 @@ def test_playing_needs_an_application(run: Run, tmp_path: Path, monkeypatch: pyt
     code, _, err = run("patches", "play", "-o", tmp_path)
     assert code == 2
     assert "set BLENDER to an application" in err
+    assert json.loads((tmp_path / STATE_FILE).read_text(encoding="utf-8"))["state"] == "starting"
+    code, _, err = run("patches", "play", "-o", _file(tmp_path, "no folder", "file") / "below")
+    assert code == 2
+    assert err.startswith("error: ")
     code, _, err = run("patches", "play", _file(tmp_path, "R,G,B\n1,1,x\n"), "-o", tmp_path)
     assert code == 2
     assert "line 2: 'x'" in err
