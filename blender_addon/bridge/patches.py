@@ -227,7 +227,7 @@ def _set_display(scene: bpy.types.Scene) -> None:
     scene.render.dither_intensity = 0.0
     scene.render.film_transparent = False
     scene.render.resolution_x = scene.render.resolution_y = 1000
-    scene.eevee.taa_samples = 1  # nothing here becomes better by waiting
+    scene.eevee.taa_samples = scene.eevee.taa_render_samples = 1  # nothing here becomes better by waiting
     view = scene.view_settings
     try:
         scene.display_settings.display_device = "sRGB"
