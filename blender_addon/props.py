@@ -43,10 +43,13 @@ def register() -> None:
     for each in _classes:
         bpy.utils.register_class(each)
     bpy.types.Scene.spectral_booth = bpy.props.PointerProperty(type=SpectralBoothScene)
+    # What the patch player shows now; belongs to the window, never to a file.
+    bpy.types.WindowManager.spectral_booth_player = bpy.props.StringProperty(options={"SKIP_SAVE"})
 
 
 def unregister() -> None:
     """Remove them again; the data stays in saved files."""
+    del bpy.types.WindowManager.spectral_booth_player
     del bpy.types.Scene.spectral_booth
     for each in reversed(_classes):
         bpy.utils.unregister_class(each)

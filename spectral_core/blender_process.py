@@ -33,16 +33,39 @@ def blender_command() -> list[str]:
     """
     if importlib.util.find_spec("bpy") is not None:
         return [sys.executable, "-m", "blender_addon.command"]
+    application = _application("pip install 'spectral-booth[blender]' (Python 3.11), or ")
+    return [application, "--background", "--command", "spectral_booth"]
+
+
+def run_in_window(script: str, blend: Path | None = None) -> None:
+    """Run Python in the application with its window, on a .blend or an empty file, until it quits.
+
+    Raises
+    ------
+    SpectralBoothError
+        With the line ``error: ...`` that the script printed.
+    BlenderError
+        If there is no application, or it broke.
+    """
+    if blend is not None and not blend.is_file():
+        raise BlenderError("no such file", where=blend, remedy="name a .blend")
+    command = [_application(""), *([str(blend)] if blend else []), "--python-expr", script]
+    code, tail = _run(command)
+    if code:
+        raise BlenderError(f"Blender stopped with code {code}: {tail}", remedy="does its window open?")
+
+
+def _application(instead: str) -> str:
+    """``BLENDER``, else ``blender`` on the path; `instead` begins the remedy if there is neither."""
     application = os.environ.get("BLENDER") or shutil.which("blender")
     if application is None:
         raise BlenderError(
             "this command needs Blender and there is none",
-            remedy="pip install 'spectral-booth[blender]' (Python 3.11), or set BLENDER to an application with the "
-            "extension installed",
+            remedy=f"{instead}set BLENDER to an application with the extension installed",
         )
     if shutil.which(application) is None:
         raise BlenderError("BLENDER names no program", where=application, remedy="set it to Blender's executable")
-    return [application, "--background", "--command", "spectral_booth"]
+    return application
 
 
 def run_verb(arguments: Sequence[str], progress: Progress | None = None, ocio: Path | None = None) -> dict[str, Any]:
@@ -58,26 +81,10 @@ def run_verb(arguments: Sequence[str], progress: Progress | None = None, ocio: P
     command = blender_command()
     with tempfile.TemporaryDirectory() as folder:
         result = Path(folder) / "result.json"
-        tail: collections.deque[str] = collections.deque(maxlen=_KEPT_LINES)
-        with subprocess.Popen(
-            [*command, *arguments, "--result", str(result)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            errors="replace",
-            env={**os.environ, "OCIO": str(ocio)} if ocio else None,
-        ) as process:
-            try:
-                refused = _follow(process, tail, progress)
-            except BaseException:
-                process.kill()
-                raise
-        if refused is not None:
-            raise VerbError(refused)
-        if process.returncode or not result.exists():
+        code, tail = _run([*command, *arguments, "--result", str(result)], progress, ocio)
+        if code or not result.exists():
             raise BlenderError(
-                f"Blender stopped with code {process.returncode} and no result: {' | '.join(tail)}",
+                f"Blender stopped with code {code} and no result: {tail}",
                 remedy="run it again; if it repeats, check the graphics driver",
             )
         document: dict[str, Any] = json.loads(result.read_text(encoding="utf-8"))
@@ -86,6 +93,28 @@ def run_verb(arguments: Sequence[str], progress: Progress | None = None, ocio: P
 
 class VerbError(SpectralBoothError):
     """What a verb inside Blender said of its input; already a whole line."""
+
+
+def _run(command: Sequence[str], progress: Progress | None = None, ocio: Path | None = None) -> tuple[int, str]:
+    """Run a command to its end: its code and its last lines; its ``error: ...`` is raised."""
+    tail: collections.deque[str] = collections.deque(maxlen=_KEPT_LINES)
+    with subprocess.Popen(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        errors="replace",
+        env={**os.environ, "OCIO": str(ocio)} if ocio else None,
+    ) as process:
+        try:
+            refused = _follow(process, tail, progress)
+        except BaseException:
+            process.kill()
+            raise
+    if refused is not None:
+        raise VerbError(refused)
+    return process.returncode, " | ".join(tail)
 
 
 def _follow(process: subprocess.Popen[str], tail: collections.deque[str], progress: Progress | None) -> str | None:

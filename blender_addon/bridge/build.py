@@ -59,7 +59,7 @@ def build_scene(scene: bpy.types.Scene, description: SceneDescription) -> Built:
     for lamp in description.lamps:
         _add_lamp(scene, lamp)
     scene.camera = _add_camera(scene, description.camera)
-    _set_world(scene)
+    set_black_world(scene)
     _set_render(scene, description.render)
     lighting.apply(scene, description.light, description.level)
     return Built(len(description.objects), len(materials), len(description.lamps))
@@ -96,7 +96,7 @@ def eevee_engine(scene: bpy.types.Scene) -> str:
 
 
 def _add_object(scene: bpy.types.Scene, item: SceneObject, material: bpy.types.Material) -> None:
-    data = _mesh_data(item.name, build_mesh(item.shape, item.size))
+    data = mesh_data(item.name, build_mesh(item.shape, item.size))
     data.materials.append(material)
     made = bpy.data.objects.new(item.name, data)
     made.location = item.location
@@ -106,7 +106,8 @@ def _add_object(scene: bpy.types.Scene, item: SceneObject, material: bpy.types.M
     scene.collection.objects.link(made)
 
 
-def _mesh_data(name: str, mesh: Mesh) -> bpy.types.Mesh:
+def mesh_data(name: str, mesh: Mesh) -> bpy.types.Mesh:
+    """A shape as a mesh of this file."""
     data = bpy.data.meshes.new(name)
     data.from_pydata(mesh.vertices.tolist(), [], [list(face) for face in mesh.faces])
     data.polygons.foreach_set("use_smooth", np.full(len(mesh.faces), mesh.smooth))
@@ -155,7 +156,7 @@ def _aim(location: tuple[float, float, float], target: tuple[float, float, float
     return (euler.x, euler.y, euler.z)
 
 
-def _set_world(scene: bpy.types.Scene) -> None:
+def set_black_world(scene: bpy.types.Scene) -> None:
     """Black: a new world is 5 % grey, which would light every surface."""
     world = bpy.data.worlds.new(f"{scene.name} (black)")
     if bpy.app.version < (5, 0, 0):

@@ -6,6 +6,7 @@ import bpy
 
 from .build import BuildScene
 from .light import CalibrateWhite, SetLevel, SetLight
+from .patches import PlayPatches
 from .render import RenderScene
 from .verify import VerifyScene
 
@@ -16,6 +17,7 @@ _classes = (
     CalibrateWhite,
     RenderScene,
     VerifyScene,
+    PlayPatches,
 )
 
 

@@ -65,6 +65,26 @@ class BuildPanel(bpy.types.Panel):
         _draw_build(self.layout)
 
 
+class DisplayPanel(bpy.types.Panel):
+    """Measure the display: screen or headset."""
+
+    bl_idname = "SPECTRAL_BOOTH_PT_display"
+    bl_label = "Display"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = CATEGORY
+    bl_parent_id = ScenePanel.bl_idname
+
+    def draw(self, context: bpy.types.Context) -> None:
+        """The player's button, and what it shows while it plays."""
+        playing = context.window_manager.spectral_booth_player
+        row = self.layout.row()
+        row.enabled = not playing
+        row.operator("spectral_booth.play_patches", text="Play Patches…", icon="PLAY")
+        if playing:
+            _draw_lines(self.layout.box(), context, [playing, "Esc stops"], "RENDER_ANIMATION")
+
+
 def _draw_build(layout: bpy.types.UILayout) -> None:
     column = layout.column(align=True)
     column.scale_y = 1.2
@@ -106,7 +126,7 @@ def _draw_lines(layout: bpy.types.UILayout, context: bpy.types.Context, lines: l
         column.label(text=line, icon="BLANK1" if number else icon)
 
 
-_classes = (LightMenu, ScenePanel, BuildPanel)
+_classes = (LightMenu, ScenePanel, DisplayPanel, BuildPanel)
 
 
 def register() -> None:

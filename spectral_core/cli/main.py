@@ -17,6 +17,7 @@ from spectral_core.cli.console import cell, emit, facts, progress_bar, rounded, 
 from spectral_core.cli.display import add_display_commands
 from spectral_core.cli.luminance import add_luminance_commands
 from spectral_core.cli.options import FiniteRange, as_json, light_option, observer_option, profile_option
+from spectral_core.cli.patches import add_patch_commands
 from spectral_core.cli.probe import add_probe_command
 from spectral_core.cli.profile import add_profile_commands
 from spectral_core.display import load_profile
@@ -179,6 +180,7 @@ add_profile_commands(cli)
 add_luminance_commands(cli)
 add_probe_command(cli)
 add_compare_command(cli)
+add_patch_commands(cli)
 add_blender_commands(cli)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from spectral_core.shapes.fruit import apple, calyx, lemon, orange, stem, tomato
 from spectral_core.shapes.mesh import Mesh, Size, rotation_matrix
-from spectral_core.shapes.revolution import sphere
+from spectral_core.shapes.revolution import capsule, sphere
 from spectral_core.shapes.solids import box, cube, plane, prism, pyramid
 
 __all__ = ["SHAPES", "Mesh", "Size", "build_mesh", "rotation_matrix"]
@@ -18,6 +18,7 @@ SHAPES: dict[str, Callable[[Size], Mesh]] = {
     "prism": prism,
     "pyramid": pyramid,
     "sphere": sphere,
+    "capsule": capsule,
     "lemon": lemon,
     "tomato": tomato,
     "apple": apple,

@@ -24,6 +24,14 @@ def sphere(size: Size) -> Mesh:
     return swept(np.stack([np.cos(angle), np.sin(angle)], axis=1), size)
 
 
+def capsule(size: Size) -> Mesh:
+    """A standing cylinder with a half ellipsoid at each end; a sphere if it is no higher than wide."""
+    angle = latitudes()
+    straight = max(size[2] / size[0] - 1.0, 0.0)
+    height = np.sin(angle) + np.sign(np.round(angle, 12)) * straight
+    return swept(np.stack([np.cos(angle), height], axis=1), size)
+
+
 def latitudes() -> Float64Array:
     """(RINGS + 1,) angles from the lower pole, -pi/2, to the upper, pi/2."""
     return np.linspace(-np.pi / 2, np.pi / 2, RINGS + 1)

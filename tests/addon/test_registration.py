@@ -24,7 +24,13 @@ def _traces() -> tuple[object, ...]:
     handlers = {
         name: len(getattr(bpy.app.handlers, name)) for name in ("undo_pre", "undo_post", "redo_pre", "redo_post")
     }
-    return types, hasattr(bpy.types.Scene, "spectral_booth"), dir(bpy.ops.spectral_booth), handlers
+    return (
+        types,
+        hasattr(bpy.types.Scene, "spectral_booth"),
+        hasattr(bpy.types.WindowManager, "spectral_booth_player"),
+        dir(bpy.ops.spectral_booth),
+        handlers,
+    )
 
 
 def test_this_blender_is_one_that_is_supported() -> None:
@@ -45,7 +51,7 @@ def test_unregister_leaves_nothing_and_register_works_again() -> None:
         assert bare[1] is False
     finally:
         blender_addon.register()
-    assert len(registered[0]) == 9  # six operators, a menu and two panels
+    assert len(registered[0]) == 11  # seven operators, a menu and three panels
 
 
 def test_registration_imports_neither_the_core_nor_colour_science() -> None:

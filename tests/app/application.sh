@@ -4,11 +4,15 @@
 #   tests/app/application.sh blender ARGUMENTS...   Blender without a window system
 #   tests/app/application.sh window ARGUMENTS...    Blender in a window; on a virtual screen where
 #                                                   there is no DISPLAY
+#   tests/app/application.sh headset ARGUMENTS...   the same with a simulated VR headset: its picture, both
+#                                                   eyes side by side, stands at the top left of the
+#                                                   screen, Blender's window to the right of it
 #   tests/app/application.sh run COMMAND...         anything else beside it (`import` of ImageMagick)
 #   tests/app/application.sh remove                 delete the folder that was made
 #
 # Which Blender:
-#   BLENDER=/path/to/blender   your own, on any system; it needs Xvfb for `window` without a DISPLAY.
+#   BLENDER=/path/to/blender   your own, on any system; it needs Xvfb for `window` without a DISPLAY, and
+#                              Xvfb, a Vulkan driver and the OpenXR runtime Monado for `headset`.
 #   otherwise                  as root on Debian or its kin, the newest one of Debian, in a folder of its
 #                              own that nothing else sees: $SPECTRAL_BOOTH_APP_ROOT, or .blender-app in the
 #                              project. It is made at the first call (a few minutes, 2.5 GB), from the
@@ -19,6 +23,7 @@ set -euo pipefail
 project=$(cd "$(dirname "${BASH_SOURCE[0]}")/../.." && pwd)
 root=${SPECTRAL_BOOTH_APP_ROOT:-$project/.blender-app}
 packages=(blender xvfb imagemagick libegl1 libgl1 libgl1-mesa-dri
+  monado-service libopenxr1-monado libopenxr-loader1 mesa-vulkan-drivers
   python3-numpy python3-openimageio python3-requests python3-zstandard python3-jsonschema python3-cattr)
 
 stop() {
@@ -69,6 +74,40 @@ inside() { # a command beside Blender, wherever that is
   fi
 }
 
+on_screen() { # WIDTH COMMAND...: the command on a virtual screen of its own; Xvfb says which number is free
+  inside bash -c '
+    export XDG_RUNTIME_DIR=$(mktemp -d)
+    numbers=$XDG_RUNTIME_DIR/number
+    mkfifo "$numbers"
+    Xvfb -displayfd 3 -screen 0 "$1x1000x24" +extension GLX 3>"$numbers" >/dev/null 2>&1 &
+    screen=$!
+    read -r number <"$numbers"
+    shift
+    status=0
+    DISPLAY=:$number "$@" || status=$?
+    kill "$screen"
+    exit "$status"' on_screen "$@"
+}
+
+# Monado draws what its headset shows into a window, at the top left where there is no window manager. Its
+# standard input must stay open, and it outlives a polite signal. The service that answers must be ours, so
+# that it is waited for: its socket appears when it is ready.
+with_monado='
+  command -v monado-service >/dev/null || { echo "error: no monado-service here; install Monado, or remove the folder that was made" >&2; exit 2; }
+  mkfifo "$XDG_RUNTIME_DIR/stdin"
+  exec 9<>"$XDG_RUNTIME_DIR/stdin"
+  export XR_RUNTIME_JSON=${XR_RUNTIME_JSON:-/usr/share/openxr/1/openxr_monado.json}
+  XRT_COMPOSITOR_FORCE_XCB=1 SIMULATED_ENABLE=1 monado-service <&9 >"$XDG_RUNTIME_DIR/monado.log" 2>&1 &
+  headset=$!
+  for _ in $(seq 100); do
+    [[ -S $XDG_RUNTIME_DIR/monado_comp_ipc ]] && break
+    sleep 0.1
+  done
+  status=0
+  "$@" 9>&- || status=$?
+  kill -9 "$headset"
+  exit "$status"'
+
 blender=${BLENDER:-blender}
 verb=${1:-}
 [[ -n $verb ]] && shift
@@ -79,19 +118,11 @@ window)
   if [[ -n ${DISPLAY:-} && -n ${BLENDER:-} ]]; then
     "$blender" "$@"
   else
-    inside bash -c '
-      # Xvfb takes a free screen number and says which.
-      export XDG_RUNTIME_DIR=$(mktemp -d)
-      numbers=$XDG_RUNTIME_DIR/number
-      mkfifo "$numbers"
-      Xvfb -displayfd 3 -screen 0 1600x1000x24 +extension GLX 3>"$numbers" >/dev/null 2>&1 &
-      screen=$!
-      read -r number <"$numbers"
-      status=0
-      DISPLAY=:$number "$@" || status=$?
-      kill "$screen"
-      exit "$status"' window "$blender" --window-geometry 0 0 1600 1000 "$@"
+    on_screen 1600 "$blender" --window-geometry 0 0 1600 1000 "$@"
   fi
+  ;;
+headset)
+  on_screen 2400 bash -c "$with_monado" headset "$blender" -noaudio --window-geometry 800 0 1600 1000 "$@"
   ;;
 remove) rm -rf "$root" ;;
 *) sed -n '2,/^set/{/^set/d;s/^# \{0,1\}//p}' "${BASH_SOURCE[0]}" >&2; exit 2 ;;

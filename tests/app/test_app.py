@@ -6,64 +6,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
-import shutil
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from real_blender import PROJECT, WORK, Application, assert_clean, log_of
 
-PROJECT = Path(__file__).parents[2]
-APPLICATION = Path(__file__).with_name("application.sh")
-# Below the project, which is the one folder that the application sees under the same path.
-WORK = PROJECT / "out" / "app"
 OLDEST = (4, 5)
-# Blender's own extension manager says it where a package of its own is missing; no add-on is concerned.
-HARMLESS = re.compile(r"bl_pkg|cattr|Error messages or info")
 LIGHTS = ("D50", "A", "two-peaks-d65")
-
-Application = Callable[..., subprocess.CompletedProcess[str]]
-
-
-@pytest.fixture(scope="session")
-def application() -> Application:
-    """Run Blender with a clean user folder: `application("blender", "--version")`."""
-    shutil.rmtree(WORK, ignore_errors=True)
-    WORK.mkdir(parents=True)
-    environment = {**os.environ, "BLENDER_USER_RESOURCES": str(WORK / "user")}
-
-    def call(*arguments: object) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            ["bash", str(APPLICATION), *map(str, arguments)],
-            cwd=PROJECT,
-            env=environment,
-            capture_output=True,
-            text=True,
-            check=False,
-            timeout=900,
-        )
-
-    return call
-
-
-@pytest.fixture(scope="session")
-def archive() -> Path:
-    """The zip of these sources."""
-    command = [sys.executable, "tools/build_extension.py", "-o", str(WORK)]
-    done = subprocess.run(command, cwd=PROJECT, capture_output=True, text=True, check=True)
-    return Path(done.stdout.splitlines()[-1])
-
-
-@pytest.fixture(scope="session")
-def installed(application: Application, archive: Path) -> Path:
-    done = application(
-        "blender", "--command", "extension", "install-file", "--repo", "user_default", "--enable", archive
-    )
-    _assert_clean(done)
-    return archive
 
 
 @pytest.fixture(scope="session")
@@ -71,33 +21,22 @@ def window(application: Application, installed: Path) -> dict:
     """What a user's session in the window found, see window.py."""
     result = WORK / "result.json"
     done = application("window", "--python", Path(__file__).with_name("window.py"), "--", result, WORK)
-    _assert_clean(done)
+    assert_clean(done)
     found = json.loads(result.read_text(encoding="utf-8"))
     assert "exception" not in found, found["exception"]
     return found
 
 
-def _log(done: subprocess.CompletedProcess[str]) -> str:
-    return done.stdout + done.stderr
-
-
-def _assert_clean(done: subprocess.CompletedProcess[str]) -> None:
-    log = _log(done)
-    assert done.returncode == 0, log
-    bad = [line for line in log.splitlines() if re.search(r"Traceback|Error|ERROR", line) and not HARMLESS.search(line)]
-    assert bad == [], log
-
-
 def test_it_is_a_supported_blender(application: Application) -> None:
     done = application("blender", "--version")
     version = re.search(r"^Blender (\d+)\.(\d+)", done.stdout, re.MULTILINE)
-    assert version, _log(done)
+    assert version, log_of(done)
     print(version[0])
     assert (int(version[1]), int(version[2])) >= OLDEST
 
 
 def test_blender_finds_the_zip_valid(application: Application, archive: Path) -> None:
-    _assert_clean(application("blender", "--command", "extension", "validate", archive))
+    assert_clean(application("blender", "--command", "extension", "validate", archive))
 
 
 def test_building_in_the_window_adds_a_scene_and_keeps_the_users(window: dict) -> None:
@@ -139,7 +78,7 @@ def test_the_panel_was_photographed(window: dict) -> None:
 def test_a_saved_file_opens_as_it_was(application: Application, window: dict) -> None:
     result = WORK / "reopened.json"
     script = Path(__file__).with_name("reopen.py")
-    _assert_clean(application("blender", "-b", WORK / "booth.blend", "--python", script, "--", result))
+    assert_clean(application("blender", "-b", WORK / "booth.blend", "--python", script, "--", result))
     assert json.loads(result.read_text(encoding="utf-8")) == window["saved"]
 
 
@@ -150,13 +89,13 @@ def test_commands_build_verify_and_render(application: Application, installed: P
     (WORK / "chart.toml").write_text(text, encoding="utf-8")
     chart, verified, picture = WORK / "chart.blend", WORK / "verify.json", WORK / "chart.png"
     command = ("--command", "spectral_booth")
-    _assert_clean(application("blender", "-b", *command, "build", WORK / "chart.toml", "-o", chart))
+    assert_clean(application("blender", "-b", *command, "build", WORK / "chart.toml", "-o", chart))
     # The file before --command is the one that is verified.
     arguments = ("verify", "--light", "A", "--level", "2", "--result", verified)
-    _assert_clean(application("blender", "-b", chart, *command, *arguments))
+    assert_clean(application("blender", "-b", chart, *command, *arguments))
     (light,) = json.loads(verified.read_text(encoding="utf-8"))["lights"]
     assert light["level2"]["dE00_in_gamut"]["max"] < 0.05  # see tests/addon/test_pixels.py
-    _assert_clean(application("blender", "-b", chart, *command, "render", "--light", "D50", "-o", picture))
+    assert_clean(application("blender", "-b", chart, *command, "render", "--light", "D50", "-o", picture))
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
@@ -173,8 +112,8 @@ def test_commands_refuse_bad_input(
     application: Application, installed: Path, arguments: tuple[str, ...], message: str
 ) -> None:
     done = application("blender", "-b", "--command", "spectral_booth", *arguments)
-    assert done.returncode == 2, _log(done)
+    assert done.returncode == 2, log_of(done)
     errors = [line for line in done.stderr.splitlines() if line.startswith("error: ")]
-    assert len(errors) == 1, _log(done)
+    assert len(errors) == 1, log_of(done)
     assert message in errors[0]
-    assert "Traceback" not in _log(done)
+    assert "Traceback" not in log_of(done)
