@@ -27,6 +27,7 @@ from spectral_core.display.export import (
 )
 from spectral_core.display.export.icc import adaptation
 from spectral_core.display.stages import SRGB, Interaction, Power, Tables, stages
+from spectral_core.display.state import HeadsetState
 from spectral_core.errors import DisplayError, OutputError
 
 Run = Callable[..., tuple[int, str, str]]
@@ -212,10 +213,11 @@ def test_ocio_clips(tmp_path: Path) -> None:
 
 
 def test_both_eyes_in_one_config(tmp_path: Path, fitted: dict[str, DisplayProfile]) -> None:
-    left, right = (replace(fitted[name], name="headset") for name in ("channel-lut", "grey-lut-corrected"))
+    eyes = {"left": "channel-lut", "right": "grey-lut-corrected"}
+    left, right = (replace(fitted[kind], name="headset", state=HeadsetState(eye=eye)) for eye, kind in eyes.items())
     first = export_ocio(left, tmp_path / "out", write_base(tmp_path))
     second = export_ocio(right, tmp_path / "out", first.config)
-    assert (first.display, second.display) == ("headset", "headset (profile)")
+    assert (first.display, second.display) == ("headset left", "headset right")
     errors = [read_back_ocio(*pair).max_dE00 for pair in ((left, first), (right, second))]
     assert errors[0] is not None
     assert errors[0] < 0.003
@@ -321,7 +323,7 @@ def icc_tags(data: bytes) -> dict[str, bytes]:
 
 def test_icc_header_and_tags(profile: DisplayProfile, tmp_path: Path) -> None:
     """ICC.1:2010-12: sizes, alignment, the profile's ID, and primaries that sum to D50."""
-    data = export_icc(profile, tmp_path / "a.icc", 120.0).read_bytes()
+    data = export_icc(replace(profile, white_luminance_cd_m2=120.0), tmp_path / "a.icc").read_bytes()
     assert struct.unpack(">I", data[:4])[0] == len(data)
     assert data[8:24] == b"\x04\x30\0\0mntrRGB XYZ "
     assert data[36:40] == b"acsp"
@@ -335,8 +337,8 @@ def test_icc_header_and_tags(profile: DisplayProfile, tmp_path: Path) -> None:
     D50 = [0.9642, 1.0, 0.8249]
     np.testing.assert_allclose(numbers["rXYZ"] + numbers["gXYZ"] + numbers["bXYZ"], D50, atol=4e-5)
     np.testing.assert_allclose(numbers["wtpt"], D50, atol=1e-5)
-    np.testing.assert_allclose(numbers["lumi"], [0, 120, 0])
     white = profile.to_XYZ(np.ones(3))
+    np.testing.assert_allclose(numbers["lumi"], [0, 120 * white[1], 0], atol=1e-5)
     np.testing.assert_allclose(numbers["chad"].reshape(3, 3) @ white / white[1], D50, atol=4e-5)
     assert tags["A2B0"] == tags["A2B1"]
     assert "lumi" not in icc_tags(export_icc(profile, tmp_path / "b.icc").read_bytes())
