@@ -28,7 +28,8 @@ def export_cube(profile: DisplayProfile, path: Path, read_as: CubeInput = "srgb"
     """Write device codes on an even lattice of sRGB, encoded or linear.
 
     Encoded input suits displays: its nodes are dense where codes change. Colours outside sRGB
-    cannot be asked for. Codes out of the display's gamut are kept, for whoever interpolates.
+    cannot be asked for. Codes are clipped: across the gamut's surface that interpolates better than
+    the powers of negative drives would.
     """
     values = lattice(NODES)
     codes = profile.to_codes((srgb_decode(values) if read_as == "srgb" else values) @ standards.srgb_to_XYZ_matrix().T)
@@ -36,10 +37,10 @@ def export_cube(profile: DisplayProfile, path: Path, read_as: CubeInput = "srgb"
         f"Device codes of the display: {export_name(profile)}",
         f"Input from 0 to 1: {_INPUTS[read_as]}; 1 1 1 is D65 at the luminance of the display's white.",
         "Colorimetric: the input's XYZ is what the display shows, its white is not adapted.",
-        "Output: device codes; clip to 0..1, what lies outside is out of the display's gamut.",
+        "Output: device codes from 0 to 1; colours out of the display's gamut are clipped channel by channel.",
         "Interpolate between nodes by tetrahedra, or else linearly.",
     )
-    write_cube(path, codes, comments)
+    write_cube(path, np.clip(codes, 0.0, 1.0), comments)
     return path
 
 

@@ -41,7 +41,7 @@ _TOE_LIGHTNESS = 0.08
 _Affine = tuple[Float64Array, Float64Array]
 
 
-def export_icc(profile: DisplayProfile, path: Path, luminance_cd_m2: float | None = None) -> Path:
+def export_icc(profile: DisplayProfile, path: Path) -> Path:
     """Write the profile as ICC; `lumi` is left out where the luminance of white is not known."""
     steps = stages(profile.model)
     white = steps.decode(np.ones(3))
@@ -59,8 +59,8 @@ def export_icc(profile: DisplayProfile, path: Path, luminance_cd_m2: float | Non
         **{f"A2B{intent}": device_to_pcs for intent in range(2)},
         **{f"B2A{intent}": pcs_to_device for intent in range(2)},
     }
-    if luminance_cd_m2 is not None:
-        tags["lumi"] = _XYZ(np.array([0.0, luminance_cd_m2, 0.0]))
+    if profile.white_luminance_cd_m2 is not None:
+        tags["lumi"] = _XYZ(np.array([0.0, profile.white_luminance_cd_m2 * white[1], 0.0]))
     with atomic_path(path) as temporary:
         temporary.write_bytes(_file(tags))
     return path

@@ -8,6 +8,8 @@ from spectral_core.display.profile import DisplayProfile
 
 
 def export_name(profile: DisplayProfile) -> str:
-    """The profile's name in letters, digits, spaces and ``-_.()``; `display` if nothing is left."""
-    name = re.sub(r"[^\w .()-]+", "_", profile.name, flags=re.ASCII)
+    """The profile's name, and its eye, in letters, digits, spaces and ``-_.()``; `display` if nothing is left."""
+    eye = profile.state.eye
+    named = f"{profile.name} {eye}" if eye in ("left", "right") and eye not in profile.name else profile.name
+    name = re.sub(r"[^\w .()-]+", "_", named, flags=re.ASCII)
     return " ".join(name.split()).strip("._- ")[:80] or "display"

@@ -24,7 +24,7 @@ from spectral_core.arrays import Float64Array
 from spectral_core.display.export.luts import write_cube, write_spi1d
 from spectral_core.display.export.names import export_name
 from spectral_core.display.profile import DisplayProfile
-from spectral_core.display.stages import SHAPER, Interaction, Power, Stages, Tables, stages
+from spectral_core.display.stages import SHAPER, Power, Stages, Tables, stages
 from spectral_core.errors import DisplayError, OutputError
 from spectral_core.files import atomic_path, is_file, read_text
 
@@ -80,17 +80,18 @@ def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport
     _refuse_foreign(folder, config)
     paths = _search_path(text, base)
     display = _free_name(export_name(profile), text)
-    steps = stages(profile.model)
-    files = [_copied(source, folder / path / source.name) for path in paths for source in _files(base.parent / path)]
-    tables = folder / ("luts" if "luts" in paths else paths[0])
-    luts, transforms = _written(steps, tables, display)
+    tables, transforms = _transforms(stages(profile.model), display)
     edited = _with_display(text, base, display, transforms)
+
+    own = folder / ("luts" if "luts" in paths else paths[0])
+    files = [_copied(source, folder / path / source.name) for path in paths for source in _files(base.parent / path)]
+    files += [_table(own / name, values) for name, values in tables.items()]
     with atomic_path(config) as temporary:
         temporary.write_text(edited, encoding="utf-8")
-    for path in _files(tables):
+    for path in _files(own):
         if _OWN_TABLE.fullmatch(path.name) and path.name not in edited:
             path.unlink()
-    return OcioExport(config, display, VIEW, (config, *luts, *files))
+    return OcioExport(config, display, VIEW, (config, *files))
 
 
 def _refuse_foreign(folder: Path, config: Path) -> None:
@@ -131,35 +132,43 @@ def _free_name(wanted: str, text: str) -> str:
     return name
 
 
-def _written(steps: Stages, folder: Path, name: str) -> tuple[list[Path], list[str]]:
-    """The tables (paths) that the steps need, and OCIO's transforms from XYZ of D65's scale to codes."""
-    files: list[Path] = []
+def _transforms(steps: Stages, name: str) -> tuple[dict[str, Float64Array], list[str]]:
+    """The tables that the steps need, by file name, and OCIO's transforms from XYZ to codes."""
+    tables: dict[str, Float64Array] = {}
     transforms = [_matrix(steps.matrix, steps.offset)]
-    if isinstance(interaction := steps.interaction, Interaction):
-        low, high = interaction.span
+    if steps.interaction is not None:
+        low, high = steps.interaction.span
         scale = 1 / (high - low)
-        table = interaction.sampled(_TABLE_NODES)
-        files.append(folder / f"{name} interaction {_digest(table)}.cube")
-        write_cube(files[-1], table, (f"Own lightness of drive: {name}",))
+        table = steps.interaction.sampled(_TABLE_NODES)
+        file = f"{name} interaction {_digest(table)}.cube"
+        tables[file] = table
         # CIE 1976 lightness is this function with these numbers, below zero too.
         transforms += [
             "!<ExponentWithLinearTransform> {gamma: 3, offset: 0.16, direction: inverse}",
             _matrix(np.diag(scale), -low * scale),
-            _file(files[-1], "tetrahedral"),
+            _file(file, "tetrahedral"),
         ]
     transforms.append(_CLAMP)
     if isinstance(curve := steps.curve, Tables):
         codes = curve.sampled(_CURVE_NODES)
-        files.append(folder / f"{name} curves {_digest(codes)}.spi1d")
-        write_spi1d(files[-1], codes)
-        transforms += [_power(np.full(3, 1 / SHAPER)), _file(files[-1], "linear")]
+        file = f"{name} curves {_digest(codes)}.spi1d"
+        tables[file] = codes
+        transforms += [_power(np.full(3, 1 / SHAPER)), _file(file, "linear")]
     elif isinstance(curve, Power):
         transforms.append(_power(curve.gamma))
         if curve.threshold.any():
             transforms += [_matrix(np.diag(1 - curve.threshold), curve.threshold), _CLAMP]
     else:
         transforms.append("!<ExponentWithLinearTransform> {gamma: 2.4, offset: 0.055, direction: inverse}")
-    return files, transforms
+    return tables, transforms
+
+
+def _table(path: Path, values: Float64Array) -> Path:
+    if values.ndim == 4:
+        write_cube(path, values, ("From lightness of drives together to each channel's own",))
+    else:
+        write_spi1d(path, values)
+    return path
 
 
 def _digest(values: Float64Array) -> str:
@@ -182,8 +191,8 @@ def _power(gamma: Float64Array) -> str:
     return f"!<ExponentTransform> {{value: [{numbers}, 1], direction: inverse}}"
 
 
-def _file(path: Path, interpolation: str) -> str:
-    return f'!<FileTransform> {{src: "{path.name}", interpolation: {interpolation}}}'
+def _file(name: str, interpolation: str) -> str:
+    return f'!<FileTransform> {{src: "{name}", interpolation: {interpolation}}}'
 
 
 def _with_display(text: str, base: Path, display: str, transforms: list[str]) -> str:
@@ -208,9 +217,10 @@ def _with_display(text: str, base: Path, display: str, transforms: list[str]) ->
     ]
     lines = _inserted(text.splitlines(), base, "displays", shown, at_end=True)
     lines = _inserted(lines, base, "colorspaces", space, at_end=False)
-    edited = "\n".join(lines) + "\n"
-    edited = re.sub(r"^(active_displays: \[.*)\]", lambda found: f"{found[1]}, {_quoted(display)}]", edited, count=1,
-                    flags=re.MULTILINE)  # fmt: skip
+    active = re.compile(r"^(active_displays: \[.*)\]$", re.MULTILINE)
+    edited, count = active.subn(lambda found: f"{found[1]}, {_quoted(display)}]", "\n".join(lines) + "\n")
+    if count != 1:
+        raise DisplayError("has no list active_displays", where=base, remedy=_REMEDY)
     return edited if edited.startswith(_MARK) else f"{_MARK} {base.name}, which says of itself:\n{edited}"
 
 

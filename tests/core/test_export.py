@@ -1,0 +1,401 @@
+from __future__ import annotations
+
+import hashlib
+import json
+import struct
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import displays
+import numpy as np
+import pytest
+
+from spectral_core import standards
+from spectral_core.display import DisplayProfile, builtin_profile_names, load_profile, srgb_decode
+from spectral_core.display.characterise import characterise
+from spectral_core.display.corrected import CorrectedLut
+from spectral_core.display.export import (
+    blender_config,
+    export_cube,
+    export_icc,
+    export_name,
+    export_ocio,
+    read_back_cube,
+    read_back_icc,
+    read_back_ocio,
+)
+from spectral_core.display.export.icc import adaptation
+from spectral_core.display.stages import SRGB, Interaction, Power, Tables, stages
+from spectral_core.display.state import HeadsetState
+from spectral_core.errors import DisplayError, OutputError
+
+Run = Callable[..., tuple[int, str, str]]
+# Of the program's models, one of each kind of steps.
+FITTED = ("gamma-matrix-black", "gain-offset-gamma", "channel-lut", "grey-lut-corrected")
+
+_HEAD = """# A small config
+ocio_profile_version: 2.1
+search_path: "luts:filmic"
+roles:
+  default: Linear
+  reference: XYZ E
+  scene_linear: Linear
+  cie_xyz_d65_interchange: XYZ D65
+displays:
+  sRGB:
+    - !<View> {name: Standard, VIEW}
+    - !<View> {name: Raw, colorspace: Non-Color}
+active_displays: [sRGB]
+active_views: [Standard, Raw]
+"""
+_SPACES = """colorspaces:
+  - !<ColorSpace>
+    name: XYZ E
+  - !<ColorSpace>
+    name: Non-Color
+    isdata: true
+  - !<ColorSpace>
+    name: Linear
+    aliases: [lin, Vive]
+    from_scene_reference: !<GroupTransform>
+      children:
+        - !<FileTransform> {src: scale.spimtx}
+        - !<MatrixTransform> {matrix: [2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 2, 0, 0, 0, 0, 1]}
+"""
+_ENCODED = """  - !<ColorSpace>
+    name: Encoded
+    from_REFERENCE_reference: !<ExponentTransform> {value: 2.2, direction: inverse}
+  - !<ColorSpace>
+    name: XYZ D65
+"""
+# Blender's configs in small: up to 4.5 all spaces belong to the scene, from 5.0 displays have their own.
+SCENE_CONFIG = (
+    _HEAD.replace("VIEW", "colorspace: Encoded")
+    + _SPACES
+    + _ENCODED.replace("REFERENCE", "scene")
+    + "    from_scene_reference: !<FileTransform> {src: scale.spimtx}\n"
+)
+DISPLAY_CONFIG = (
+    _HEAD.replace("VIEW", "view_transform: Standard, display_colorspace: Encoded")
+    + _SPACES
+    + "display_colorspaces:\n"
+    + _ENCODED.replace("REFERENCE", "display")
+    + """default_view_transform: Standard
+view_transforms:
+  - !<ViewTransform>
+    name: Standard
+    from_scene_reference: !<FileTransform> {src: scale.spimtx}
+"""
+)
+
+
+@pytest.fixture(scope="session")
+def fitted() -> dict[str, DisplayProfile]:
+    """Models of a simulated OLED whose channels depend on each other, read with noise."""
+    measured = displays.measure(displays.power_limited, displays.published_protocol(), seed=3)
+    return {name: DisplayProfile(name, characterise(measured, name).chosen.model) for name in FITTED}
+
+
+@pytest.fixture(params=[*builtin_profile_names(), *FITTED])
+def profile(request: pytest.FixtureRequest, fitted: dict[str, DisplayProfile]) -> DisplayProfile:
+    return fitted[request.param] if request.param in fitted else load_profile(request.param)
+
+
+@pytest.fixture(params=[SCENE_CONFIG, DISPLAY_CONFIG], ids=["scene", "display"])
+def base(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    return write_base(tmp_path, request.param)
+
+
+def write_base(folder: Path, text: str = SCENE_CONFIG) -> Path:
+    path = folder / "base" / "config.ocio"
+    (path.parent / "luts").mkdir(parents=True)
+    path.write_text(text)
+    rows = "1.1 0 0 0\n0 1 0 0\n0 0 0.9 0\n"
+    (path.parent / "luts" / "scale.spimtx").write_text(rows)
+    return path
+
+
+def test_steps_are_the_model(profile: DisplayProfile) -> None:
+    """Rounding near black is raised to 1 / gamma: codes where drive is above 1e-5 to 1e-9, all of them in XYZ."""
+    steps = stages(profile.model)
+    codes = np.random.default_rng(0).uniform(0, 1, (5000, 3))
+    codes[:200] = np.linspace(0, 1, 200)[:, None]
+    XYZ = profile.to_XYZ(codes)
+    lit = profile.to_linear(XYZ).min(axis=1) > 1e-5
+    np.testing.assert_allclose(steps.encode(XYZ[lit]), profile.to_codes(XYZ[lit]), atol=1e-9)
+    np.testing.assert_allclose(profile.to_XYZ(steps.encode(XYZ)), XYZ, atol=1e-9)
+    np.testing.assert_allclose(steps.decode(codes), XYZ, atol=1e-12)
+    assert isinstance(steps.curve, SRGB if profile.name == "sRGB" else Power | Tables)
+    assert (steps.interaction is not None) == isinstance(profile.model, CorrectedLut)
+
+
+def test_steps_out_of_gamut_are_the_models(profile: DisplayProfile) -> None:
+    XYZ = np.random.default_rng(1).uniform(0, 1.2, (500, 3))
+    np.testing.assert_allclose(stages(profile.model).encode(XYZ), profile.to_codes(XYZ), atol=1e-9)
+
+
+def test_an_unknown_model_is_refused() -> None:
+    with pytest.raises(DisplayError, match="no steps"):
+        stages(object())  # type: ignore[arg-type]
+
+
+def test_a_sampled_interaction_meets_its_nodes(fitted: dict[str, DisplayProfile]) -> None:
+    interaction = stages(fitted["grey-lut-corrected"].model).interaction
+    assert isinstance(interaction, Interaction)
+    low, high = interaction.span
+    sampled = interaction.sampled(5)
+    np.testing.assert_allclose(sampled[1, 2, 4], interaction.own(low + (high - low) * [0.25, 0.5, 1.0]), atol=1e-12)
+    codes = np.random.default_rng(0).uniform(0, 1, (2000, 3))
+    together = interaction.together(codes)
+    assert (together >= low).all()
+    assert (together <= high).all()
+
+
+def test_ocio_gives_the_codes(profile: DisplayProfile, base: Path, tmp_path: Path) -> None:
+    """Exact models: what 32-bit floats of XYZ leave, 2e-3 at channels of drive 0 and 0.003 dE00; the
+    channels' interaction is resampled."""
+    exported = export_ocio(profile, tmp_path / "out", base)
+    read = read_back_ocio(profile, exported)
+    assert read.by is not None, read.why
+    assert read.max_code_error is not None
+    assert read.max_dE00 is not None
+    if isinstance(profile.model, CorrectedLut):
+        assert read.max_code_error < 0.05
+        assert read.max_dE00 < 0.5
+    else:
+        assert read.max_code_error < 2e-3
+        assert read.max_dE00 < 0.003
+    assert read.colours > 4000
+    assert all(path.is_file() for path in exported.files)
+
+
+@pytest.mark.parametrize("name", ["sRGB", "htc-vive-2021", "gain-offset-gamma", "channel-lut", "grey-lut-corrected"])
+def test_ocio_away_from_black(
+    name: str, fitted: dict[str, DisplayProfile], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From code 0.1 on 32-bit floats tell 1e-5; lines between a table's nodes 5e-5; the resampled table half
+    a level of 8 bits."""
+    profile = fitted[name] if name in fitted else load_profile(name)
+    codes = np.random.default_rng(0).uniform(0.1, 1, (3000, 3))
+    monkeypatch.setattr("spectral_core.display.export.read_back.probe_codes", lambda: codes)
+    read = read_back_ocio(profile, export_ocio(profile, tmp_path / "out", write_base(tmp_path)))
+    assert read.max_code_error is not None
+    assert read.max_code_error < {"channel-lut": 5e-5, "grey-lut-corrected": 2e-3}.get(name, 2e-5)
+
+
+def test_ocio_keeps_what_the_config_had(base: Path, tmp_path: Path) -> None:
+    exported = export_ocio(load_profile("htc-vive-2020"), tmp_path / "out", base)
+    made = exported.config.read_text().splitlines()
+    for line in base.read_text().splitlines():
+        assert line in made or line.startswith("active_displays")
+    assert 'active_displays: [sRGB, "htc-vive-2020"]' in made
+    assert (exported.display, exported.view) == ("htc-vive-2020", "Standard")
+    assert (tmp_path / "out/luts/scale.spimtx").read_text() == (base.parent / "luts/scale.spimtx").read_text()
+
+
+def test_ocio_clips(tmp_path: Path) -> None:
+    """Below 0, above 1 and far beyond: in the range, channel by channel."""
+    from spectral_core.imaging import oiio
+
+    profile = load_profile("htc-vive-2021")
+    exported = export_ocio(profile, tmp_path / "out", write_base(tmp_path))
+    XYZ = np.array([[-1.0, 0.5, 2.0], [0.0, 1.0, 0.0], [1e4, 1e4, 1e4], [0.5, 0.5, -0.2]])
+    image = oiio().ImageBuf(oiio().ImageSpec(len(XYZ), 1, 3, oiio().FLOAT))
+    # Twice the XYZ of D65's scale is the config's scene-linear.
+    image.set_pixels(oiio().ROI(), np.float32(2 * XYZ[None]))
+    shown = oiio().ImageBufAlgo.ociodisplay(
+        image, exported.display, exported.view, "scene_linear", colorconfig=str(exported.config)
+    )
+    assert not shown.has_error, shown.geterror()
+    got = shown.get_pixels(oiio().FLOAT).reshape(-1, 3)
+    np.testing.assert_allclose(got, np.clip(profile.to_codes(XYZ), 0, 1), atol=1e-5)
+
+
+def test_both_eyes_in_one_config(tmp_path: Path, fitted: dict[str, DisplayProfile]) -> None:
+    eyes = {"left": "channel-lut", "right": "grey-lut-corrected"}
+    left, right = (replace(fitted[kind], name="headset", state=HeadsetState(eye=eye)) for eye, kind in eyes.items())
+    first = export_ocio(left, tmp_path / "out", write_base(tmp_path))
+    second = export_ocio(right, tmp_path / "out", first.config)
+    assert (first.display, second.display) == ("headset left", "headset right")
+    errors = [read_back_ocio(*pair).max_dE00 for pair in ((left, first), (right, second))]
+    assert errors[0] is not None
+    assert errors[0] < 0.003
+    assert errors[1] is not None
+    assert errors[1] < 0.5
+
+
+def test_a_new_profile_of_the_same_name_replaces_the_old(tmp_path: Path, fitted: dict[str, DisplayProfile]) -> None:
+    """OpenColorIO never reads a file twice: the new table has a new name, the old one goes."""
+    base = write_base(tmp_path)
+    for name in ("grey-lut-corrected", "channel-lut"):
+        profile = replace(fitted[name], name="headset")
+        read = read_back_ocio(profile, export_ocio(profile, tmp_path / "out", base))
+        assert read.max_dE00 is not None
+        assert read.max_dE00 < 0.5
+    assert len(list((tmp_path / "out/luts").iterdir())) == 2
+
+
+def test_taken_names_are_left_to_blender(base: Path, tmp_path: Path) -> None:
+    for taken in ("sRGB", "vive", "XYZ d65", "scene_linear"):
+        profile = replace(load_profile("htc-vive-2020"), name=taken)
+        assert export_ocio(profile, tmp_path / "out", base).display == f"{taken} (profile)"
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("My headset, left: 80 %", "My headset_ left_ 80"), ("../../etc", "etc"), ("  ", "display"), ("ü\n{}", "display")],
+)
+def test_names_fit_files_and_configs(name: str, expected: str) -> None:
+    assert export_name(replace(load_profile("sRGB"), name=name)) == expected
+
+
+def test_foreign_folders_stay_as_they_are(tmp_path: Path) -> None:
+    base, folder = write_base(tmp_path), tmp_path / "mine"
+    folder.mkdir()
+    (folder / "config.ocio").write_text(SCENE_CONFIG)
+    for target in (folder, base.parent):
+        with pytest.raises(OutputError, match="not from here"):
+            export_ocio(load_profile("sRGB"), target, base)
+    assert (folder / "config.ocio").read_text() == SCENE_CONFIG
+    assert [path.name for path in folder.iterdir()] == ["config.ocio"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("  reference: XYZ E\n", ""), "no role 'reference'"),
+        (("search_path", "no_path"), "search_path"),
+        (('"luts:filmic"', '"/etc:luts"'), "search_path"),
+        (("colorspaces:\n", "spaces:\n"), "no section 'colorspaces'"),
+        (("active_displays: [sRGB]\n", ""), "active_displays"),
+    ],
+)
+def test_other_configs_are_refused(tmp_path: Path, change: tuple[str, str], message: str) -> None:
+    base = write_base(tmp_path, SCENE_CONFIG.replace(*change))
+    with pytest.raises(DisplayError, match=message):
+        export_ocio(load_profile("sRGB"), tmp_path / "out", base)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_config_of_the_blender_at_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("OCIO", raising=False)
+    with pytest.raises(DisplayError, match="--base"):  # bpy is blocked here
+        blender_config()
+    base = write_base(tmp_path)
+    monkeypatch.setenv("OCIO", str(base))
+    assert blender_config() == base
+
+
+def read_cube(path: Path) -> np.ndarray:
+    """Rows (n, 3) of a .cube file, by the format's own words."""
+    lines = [line for line in path.read_text().splitlines() if line and line[0] not in "#LDT"]
+    return np.array([[float(cell) for cell in line.split()] for line in lines])
+
+
+@pytest.mark.parametrize("read_as", ["srgb", "linear"])
+def test_cube_holds_the_codes(profile: DisplayProfile, tmp_path: Path, read_as: str) -> None:
+    """At nodes to the file's seven decimals; between them linear input is far worse near black."""
+    path = export_cube(profile, tmp_path / "a.cube", read_as)  # type: ignore[arg-type]
+    rows = read_cube(path)
+    assert len(rows) == 65**3
+    for r, g, b in ((0, 0, 0), (64, 64, 64), (40, 20, 31), (3, 60, 12)):
+        asked = np.array([r, g, b]) / 64
+        XYZ = standards.srgb_to_XYZ_matrix() @ (srgb_decode(asked) if read_as == "srgb" else asked)
+        np.testing.assert_allclose(rows[r + 65 * g + 65**2 * b], np.clip(profile.to_codes(XYZ), 0, 1), atol=6e-8)
+    read = read_back_cube(profile, path, read_as)  # type: ignore[arg-type]
+    assert read.max_code_error is not None, read.why
+    assert read.max_code_error < (0.04 if read_as == "srgb" else 0.1)
+    assert f"{'sRGB-encoded' if read_as == 'srgb' else 'linear'} RGB" in path.read_text()
+
+
+def test_srgb_to_srgb_is_the_identity_cube(tmp_path: Path) -> None:
+    profile = load_profile("sRGB")
+    read = read_back_cube(profile, export_cube(profile, tmp_path / "a.cube"), "srgb")
+    assert read.max_code_error == pytest.approx(0, abs=1e-6)
+
+
+def icc_tags(data: bytes) -> dict[str, bytes]:
+    count = struct.unpack(">I", data[128:132])[0]
+    entries = [struct.unpack(">4sII", data[132 + 12 * i : 144 + 12 * i]) for i in range(count)]
+    return {name.decode(): data[start : start + size] for name, start, size in entries}
+
+
+def test_icc_header_and_tags(profile: DisplayProfile, tmp_path: Path) -> None:
+    """ICC.1:2010-12: sizes, alignment, the profile's ID, and primaries that sum to D50."""
+    data = export_icc(replace(profile, white_luminance_cd_m2=120.0), tmp_path / "a.icc").read_bytes()
+    assert struct.unpack(">I", data[:4])[0] == len(data)
+    assert data[8:24] == b"\x04\x30\0\0mntrRGB XYZ "
+    assert data[36:40] == b"acsp"
+    without = data[:44] + bytes(4) + data[48:64] + bytes(4) + data[68:84] + bytes(16) + data[100:]
+    assert data[84:100] == hashlib.md5(without, usedforsecurity=False).digest()
+    tags = icc_tags(data)
+    assert all(struct.unpack(">I", data[136 + 12 * i : 140 + 12 * i])[0] % 4 == 0 for i in range(len(tags)))
+    numbers = {
+        name: np.frombuffer(tag[8:], ">i4") / 65536 for name, tag in tags.items() if tag[:4] in (b"XYZ ", b"sf32")
+    }
+    D50 = [0.9642, 1.0, 0.8249]
+    np.testing.assert_allclose(numbers["rXYZ"] + numbers["gXYZ"] + numbers["bXYZ"], D50, atol=4e-5)
+    np.testing.assert_allclose(numbers["wtpt"], D50, atol=1e-5)
+    white = profile.to_XYZ(np.ones(3))
+    np.testing.assert_allclose(numbers["lumi"], [0, 120 * white[1], 0], atol=1e-5)
+    np.testing.assert_allclose(numbers["chad"].reshape(3, 3) @ white / white[1], D50, atol=4e-5)
+    assert tags["A2B0"] == tags["A2B1"]
+    assert "lumi" not in icc_tags(export_icc(profile, tmp_path / "b.icc").read_bytes())
+
+
+def test_adaptation_is_bradford() -> None:
+    """D65 to D50 as published (Lindbloom), whose D50 has Z = 0.8252 where ICC's has 0.8249."""
+    published = [[1.0478, 0.0229, -0.0501], [0.0295, 0.9905, -0.0171], [-0.0092, 0.0150, 0.7521]]
+    np.testing.assert_allclose(adaptation(np.array([0.95047, 1.0, 1.08883])), published, atol=3e-4)
+
+
+def test_icc_read_by_littlecms(profile: DisplayProfile, tmp_path: Path) -> None:
+    """LittleCMS rounds to 8 bits (0.002). Where a curve is steep at black, a matrix in ICC's numbers
+    of 1.5e-5 adds up to 0.05 that no eye sees: dE00 is that of 8 bits."""
+    pytest.importorskip("PIL.ImageCms")
+    read = read_back_icc(profile, export_icc(profile, tmp_path / "a.icc"))
+    assert read.by is not None
+    assert read.by.startswith("LittleCMS")
+    assert read.max_code_error is not None
+    assert read.max_code_error < (0.0021 if profile.name == "sRGB" else 0.05)
+    assert read.max_dE00 is not None
+    assert read.max_dE00 < 1.6
+    assert read.colours > 3000
+
+
+def test_command(run: Run, tmp_path: Path) -> None:
+    base, out = write_base(tmp_path), tmp_path / "out"
+    code, text, _ = run("profile", "export", "htc-vive-2020", "--ocio", out, "--base", base, "--json")
+    document = json.loads(text)
+    assert code == 0
+    assert document["files"][0] == str(out / "config.ocio")
+    assert document["max_code_error"] < 2e-3
+    assert document["max_code_error_8bit"] == pytest.approx(255 * document["max_code_error"])
+    assert document["read_back_by"].startswith("OpenColorIO")
+    assert (document["display"], document["view"], document["warnings"]) == ("htc-vive-2020", "Standard", [])
+    for option, name in (("--cube", "a.cube"), ("--icc", "a.icc")):
+        code, text, _ = run("profile", "export", "htc-vive-2020", option, tmp_path / name, "--json")
+        assert code == 0
+        assert json.loads(text)["files"] == [str(tmp_path / name)]
+        assert (tmp_path / name).is_file()
+
+
+def test_what_could_not_be_read_back_is_said(run: Run, tmp_path: Path) -> None:
+    base = write_base(tmp_path, SCENE_CONFIG.replace("version: 2.1", "version: 2.99"))
+    code, text, err = run("profile", "export", "sRGB", "--ocio", tmp_path / "out", "--base", base, "--json")
+    document = json.loads(text)
+    assert code == 0
+    assert document["max_code_error"] is None
+    assert document["read_back_by"] is None
+    assert err.startswith("warning: not read back: OpenImageIO")
+
+
+@pytest.mark.parametrize("arguments", [(), ("--ocio", "a", "--icc", "b"), ("--ocio", "a", "--base", "nowhere.ocio")])
+def test_bad_commands(run: Run, arguments: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, out, err = run("profile", "export", "sRGB", *arguments)
+    assert (code, out) == (2, "")
+    assert err.startswith("error: ")
+    assert len(err.splitlines()) == 1
+    assert not list(tmp_path.iterdir())
