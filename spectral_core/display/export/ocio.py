@@ -91,14 +91,22 @@ def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport
     edited = _with_display(text, base, display, transforms)
 
     own = folder / ("luts" if "luts" in paths else paths[0])
-    files = [_copied(source, folder / path / source.name) for path in paths for source in _files(base.parent / path)]
-    files += [_table(own / name, values) for name, values in tables.items()]
+    files = [_table(own / name, values) for name, values in tables.items()]
+    for source in (source for path in paths for source in _files(base.parent / path)):
+        target = folder / source.relative_to(base.parent)
+        if target not in files and not _is_left_over(source, edited):
+            files.append(_copied(source, target))
     with atomic_path(config) as temporary:
         temporary.write_text(edited, encoding="utf-8")
     for path in _files(own):
-        if _OWN_TABLE.fullmatch(path.name) and path.name not in edited:
+        if _is_left_over(path, edited):
             path.unlink()
     return OcioExport(config, display, VIEW, (config, *files))
+
+
+def _is_left_over(path: Path, text: str) -> bool:
+    """Whether a table of an earlier export is used no more."""
+    return _OWN_TABLE.fullmatch(path.name) is not None and path.name not in text
 
 
 def _refuse_foreign(folder: Path, config: Path) -> None:
