@@ -32,7 +32,7 @@ lights = ["A"]
 [white]
 object = "white"
 [camera]
-location = [0.0, -0.55, 0.0]
+location = [0.0, -1.0, 0.0]
 target = [0.0, 0.0, 0.0]
 [[lamps]]
 name = "sun"
