@@ -15,12 +15,12 @@ from spectral_core.cli.export import export
 from spectral_core.cli.options import FiniteRange, as_json
 from spectral_core.display import DisplayProfile, load_profile, write_profile
 from spectral_core.display.chromaticities import xy
-from spectral_core.display.fitting import gamma_fit
-from spectral_core.display.luminance import scene_white
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.limits.luminance import scene_white
+from spectral_core.display.measuring.measurements import Measurements
+from spectral_core.display.measuring.state import EYES, HeadsetState
 from spectral_core.display.models import DisplayModel
+from spectral_core.display.models.fitting import gamma_fit
 from spectral_core.display.profile import MODELS
-from spectral_core.display.state import EYES, HeadsetState
 from spectral_core.errors import DisplayError
 
 Command = TypeVar("Command", bound=Callable[..., Any])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.display.comparison import Comparison
+from spectral_core.display.judging.comparison import Comparison
 from spectral_core.report.diagram import CIE_1931, background
 from spectral_core.report.extras import extra
 from spectral_core.report.figures import GRID, INK, MUTED, new_figure, style, write_figure

@@ -12,7 +12,7 @@ import numpy as np
 from spectral_core import standards
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.display import srgb, srgb_encode
-from spectral_core.display.coverage import uv_to_xy, xy_to_uv
+from spectral_core.display.limits.coverage import uv_to_xy, xy_to_uv
 from spectral_core.report.figures import INK
 
 # Second radiation constant of Planck's law, ITS-90 as CIE 15 uses it, in nm K.

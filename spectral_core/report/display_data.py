@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.display.characterise import Characterisation
-from spectral_core.display.coverage import XYZ_to_xy, xy_to_uv
-from spectral_core.display.fitting import primaries
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.characterising.characterise import Characterisation
+from spectral_core.display.limits.coverage import XYZ_to_xy, xy_to_uv
+from spectral_core.display.measuring.measurements import Measurements
+from spectral_core.display.models.fitting import primaries
 from spectral_core.standards import XYZ_to_Lab
 
 # With fewer levels there is no curve to show, only its end.

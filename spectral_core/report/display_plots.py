@@ -10,9 +10,9 @@ import numpy as np
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array
-from spectral_core.display.characterise import Characterisation
-from spectral_core.display.coverage import XYZ_to_xy, reference_xy, xy_to_uv
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.characterising.characterise import Characterisation
+from spectral_core.display.limits.coverage import XYZ_to_xy, reference_xy, xy_to_uv
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.report.diagram import CIE_1976, background, daylight_xy, planckian_xy, wavelength_labels
 from spectral_core.report.display_data import HeldOut, Ramp, primaries_XYZ
 from spectral_core.report.extras import extra

@@ -11,8 +11,9 @@ import numpy as np
 from spectral_core import standards
 from spectral_core.arrays import Float64Array
 from spectral_core.display import srgb
-from spectral_core.display.characterise import Characterisation, ModelResult
-from spectral_core.display.coverage import (
+from spectral_core.display.characterising.characterise import Characterisation, ModelResult
+from spectral_core.display.judging.eyes import EyeDifference
+from spectral_core.display.limits.coverage import (
     Coverage,
     XYZ_to_xy,
     coverage,
@@ -21,8 +22,7 @@ from spectral_core.display.coverage import (
     volume,
     xy_to_uv,
 )
-from spectral_core.display.eyes import EyeDifference
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.report.display_data import HeldOut, primaries_XYZ, worst
 from spectral_core.report.numerals import NONE, fixed, percent
 from spectral_core.report.tables import Row, Table, css_colour

@@ -14,7 +14,7 @@ from blender_addon.bridge.display_nodes import display_group, remove_group
 from blender_addon.bridge.render import render_linear
 from spectral_core.arrays import frozen
 from spectral_core.display import DisplayProfile, load_profile, srgb_decode, srgb_encode
-from spectral_core.display.fitting import MODEL_KINDS
+from spectral_core.display.models.fitting import MODEL_KINDS
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 sys.path.append(str(Path(__file__).parents[1] / "core"))

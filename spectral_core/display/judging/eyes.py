@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spectral_core.display.characterise import Characterisation, errors
-from spectral_core.display.coverage import XYZ_to_xy, xy_to_uv
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.characterising.characterise import Characterisation, errors
+from spectral_core.display.limits.coverage import XYZ_to_xy, xy_to_uv
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.verification import Percentiles, percentiles
 
 

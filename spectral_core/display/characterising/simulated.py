@@ -8,11 +8,11 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.display.builtin import load_profile
-from spectral_core.display.characterise import Characterisation
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.characterising.characterise import Characterisation
+from spectral_core.display.characterising.noise import noisy
+from spectral_core.display.characterising.repeats import reading_noise
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models import DisplayModel
-from spectral_core.display.noise import noisy
-from spectral_core.display.repeats import reading_noise
 
 # Of an instrument nobody knows: what the published headset's was, in ln Y and in x and y.
 ASSUMED_NOISE = (0.01, 0.0015)

@@ -14,7 +14,7 @@ import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array, FloatArray
 from spectral_core.display.chromaticities import uv
-from spectral_core.display.gamut import map_to_gamut, peak_luminance, reach
+from spectral_core.display.limits.gamut import map_to_gamut, peak_luminance, reach
 from spectral_core.display.profile import GAMUT_TOLERANCE, DisplayProfile
 from spectral_core.errors import DisplayError
 from spectral_core.lights import Light

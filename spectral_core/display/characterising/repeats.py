@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray
-from spectral_core.display.measurements import SAME_CODE, Measurements
-from spectral_core.display.verdicts import Verdict, untold
+from spectral_core.display.characterising.verdicts import Verdict, untold
+from spectral_core.display.measuring.measurements import SAME_CODE, Measurements
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 # Of white's luminance: darker patches are read too coarsely for a trend.
