@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from spectral_core.display.characterise import characterise, folds
-from spectral_core.display.measurements import Measurements, read_measurements
+from spectral_core.display.characterising.characterise import characterise, folds
+from spectral_core.display.measuring.measurements import Measurements, read_measurements
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 from spectral_core.verification import percentiles
 

@@ -22,9 +22,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "core"))
 import displays
 
 from spectral_core.display.models import GammaMatrix
-from spectral_core.display.probe import probe
-from spectral_core.display.probe_patches import probe_patches
-from spectral_core.display.runtimes import Runtime, combined_runtimes, single_runtimes
+from spectral_core.display.probing.probe import probe
+from spectral_core.display.probing.probe_patches import probe_patches
+from spectral_core.display.probing.runtimes import Runtime, combined_runtimes, single_runtimes
 
 WHITE_Y = displays.additive(np.ones((1, 3)))[0, 1]
 PANEL = GammaMatrix(displays.GAMMA, displays.MATRIX / WHITE_Y, displays.BLACK / WHITE_Y)

@@ -11,9 +11,9 @@ import numpy as np
 from spectral_core import light_design, standards, weights
 from spectral_core.arrays import Float64Array
 from spectral_core.display import DisplayProfile, srgb
-from spectral_core.display.advice import Advice
-from spectral_core.display.characterise import Characterisation
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.characterising.advice import Advice
+from spectral_core.display.characterising.characterise import Characterisation
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.profile import in_gamut
 from spectral_core.errors import LightError, TextureError
 from spectral_core.lights import Light, LightQuality, builtin_names

@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 
 from spectral_core.arrays import Float32Array
+from spectral_core.display.judging.shown import ShownLight, ShownPatch, compare_shown
 from spectral_core.display.profile import DisplayProfile
-from spectral_core.display.shown import ShownLight, ShownPatch, compare_shown
 from spectral_core.errors import BlenderError
 from spectral_core.scene import resolve_light
 

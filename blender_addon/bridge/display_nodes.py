@@ -2,7 +2,7 @@
 
 Blender's headset path ignores colour management, and the runtime encodes what it is given to sRGB.
 So the shader computes the device codes itself and emits their sRGB decoding: the encoding of the
-runtime then yields the codes. The steps are those of `spectral_core.display.stages`.
+runtime then yields the codes. The steps are those of `spectral_core.display.models.stages`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import bpy
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.display.corrected import TOE, TOE_SLOPE
+from spectral_core.display.models.corrected import TOE, TOE_SLOPE
+from spectral_core.display.models.stages import SHAPER, SRGB, Interaction, Power, Stages, Tables, stages
 from spectral_core.display.profile import DisplayProfile
-from spectral_core.display.stages import SHAPER, SRGB, Interaction, Power, Stages, Tables, stages
 
 GROUP_KEY = "spectral_booth_display"
 # Nodes a side of a 3-D table: in a picture of 65 x 4225 texels, 4.4 MB.

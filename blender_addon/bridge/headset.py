@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import bpy
 
 from spectral_core.display import DisplayProfile, load_profile
-from spectral_core.display.luminance import eye_scene_whites, scene_white
+from spectral_core.display.limits.luminance import eye_scene_whites, scene_white
 from spectral_core.errors import BlenderError
 from spectral_core.standards import srgb_to_XYZ_matrix
 

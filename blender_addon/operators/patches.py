@@ -104,7 +104,7 @@ class PlayPatches(bpy.types.Operator):
         self._end()
 
     def _start(self, context: bpy.types.Context) -> None:
-        from spectral_core.display import patches, playback
+        from spectral_core.display.measuring import patches, playback
         from spectral_core.errors import BlenderError
 
         from ..bridge import patches as stage
@@ -135,7 +135,7 @@ class PlayPatches(bpy.types.Operator):
 
     def _update(self, now: float) -> None:
         """What is shown, and what the files, the status bar and the panel say of it, if it changed."""
-        from spectral_core.display import playback
+        from spectral_core.display.measuring import playback
 
         from ..bridge import patches as stage
 
@@ -158,7 +158,7 @@ class PlayPatches(bpy.types.Operator):
         _say(self._workspace, f"Patch {document['index']} of {document['count']}: {levels} ({document['state']})")
 
     def _end(self) -> None:
-        from spectral_core.display import playback
+        from spectral_core.display.measuring import playback
 
         now = time.time()
         self._playback.stop(now)  # unless it is done

@@ -11,14 +11,14 @@ from spectral_core.arrays import Float64Array
 from spectral_core.cli.console import Document, emit, rounded, table
 from spectral_core.cli.options import as_json, observer_option
 from spectral_core.display import load_profile
-from spectral_core.display.comparison import (
+from spectral_core.display.judging.comparison import (
     Colours,
     Comparison,
     predict,
     read_colours,
     unit_warnings,
 )
-from spectral_core.display.comparison import compare as pair
+from spectral_core.display.judging.comparison import compare as pair
 from spectral_core.errors import DisplayError
 
 _PATH = click.Path(path_type=Path)

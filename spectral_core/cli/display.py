@@ -20,12 +20,12 @@ from spectral_core.cli.display_tables import show_advice, show_characterisation
 from spectral_core.cli.options import FiniteRange, as_json, observer_option, profile_option
 from spectral_core.cli.profile import make_profile, profile_warnings, state_options
 from spectral_core.display import load_profile, write_profile
-from spectral_core.display.advice import LARGEST, advise
-from spectral_core.display.characterise import characterise as choose
-from spectral_core.display.eyes import eye_difference
-from spectral_core.display.fitting import MODEL_KINDS
-from spectral_core.display.gamut import GAMUT_RULES, GamutCounts, map_to_gamut
-from spectral_core.display.measurements import Measurements, read_measurements
+from spectral_core.display.characterising.advice import LARGEST, advise
+from spectral_core.display.characterising.characterise import characterise as choose
+from spectral_core.display.judging.eyes import eye_difference
+from spectral_core.display.limits.gamut import GAMUT_RULES, GamutCounts, map_to_gamut
+from spectral_core.display.measuring.measurements import Measurements, read_measurements
+from spectral_core.display.models.fitting import MODEL_KINDS
 from spectral_core.documents import advice_document, characterise_document
 from spectral_core.errors import DisplayError
 from spectral_core.files import atomic_path, read_text

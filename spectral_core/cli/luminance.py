@@ -13,8 +13,8 @@ from spectral_core.arrays import Float64Array
 from spectral_core.cli.console import Document, emit, facts, rounded, table
 from spectral_core.cli.options import FiniteRange, as_json, observer_option, profile_option
 from spectral_core.display import load_profile
-from spectral_core.display.field import FieldReport, field_report, read_field
-from spectral_core.display.luminance import LuminanceMapping, SceneColour, map_luminance
+from spectral_core.display.judging.field import FieldReport, field_report, read_field
+from spectral_core.display.limits.luminance import LuminanceMapping, SceneColour, map_luminance
 from spectral_core.lights import Light
 from spectral_core.report.field import write_field_plot
 from spectral_core.spectra import Spectra, colorchecker_spectra, read_spectra

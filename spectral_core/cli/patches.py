@@ -10,8 +10,8 @@ import click
 from spectral_core.blender_process import run_in_window
 from spectral_core.cli.console import Document, emit, facts, progress_bar
 from spectral_core.cli.options import FiniteRange, as_json
-from spectral_core.display import playback
-from spectral_core.display.patches import PUBLISHED, pair, read_patches, write_paired, write_patches
+from spectral_core.display.measuring import playback
+from spectral_core.display.measuring.patches import PUBLISHED, pair, read_patches, write_paired, write_patches
 from spectral_core.errors import BlenderError, DisplayError
 from spectral_core.files import read_text
 

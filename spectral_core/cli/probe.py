@@ -10,12 +10,17 @@ import click
 from spectral_core.cli.console import Document, emit, facts, rounded, table
 from spectral_core.cli.options import as_json, observer_option
 from spectral_core.display import DisplayProfile, load_profile
-from spectral_core.display.correction import correct, correction_document, unreachable_document, write_correction
-from spectral_core.display.measurements import Measurements, read_measurements
-from spectral_core.display.probe import Probe
-from spectral_core.display.probe import probe as infer
-from spectral_core.display.probe_patches import patches_text, probe_patches, write_patches
-from spectral_core.display.repeats import noise
+from spectral_core.display.characterising.repeats import noise
+from spectral_core.display.measuring.measurements import Measurements, read_measurements
+from spectral_core.display.probing.correction import (
+    correct,
+    correction_document,
+    unreachable_document,
+    write_correction,
+)
+from spectral_core.display.probing.probe import Probe
+from spectral_core.display.probing.probe import probe as infer
+from spectral_core.display.probing.probe_patches import patches_text, probe_patches, write_patches
 from spectral_core.errors import DisplayError
 
 _PATH = click.Path(path_type=Path)

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array, FloatArray
-from spectral_core.display.corrected import CorrectedLut
+from spectral_core.display.measuring.state import HeadsetState
 from spectral_core.display.models import DisplayModel, GammaMatrix, SRGBCurve
-from spectral_core.display.state import HeadsetState
-from spectral_core.display.tone_models import GainOffsetGamma, LutMatrix
+from spectral_core.display.models.corrected import CorrectedLut
+from spectral_core.display.models.tone_models import GainOffsetGamma, LutMatrix
 from spectral_core.errors import DisplayError
 from spectral_core.files import atomic_path, is_file, read_text, why_no_file
 
@@ -58,7 +58,7 @@ class DisplayProfile:
         What was measured, and in what state.
     scene_white
         Luminance that a scene's white is shown at, as a fraction of white's, above 0 and up to 1;
-        None for the default (`spectral_core.display.luminance.scene_white`).
+        None for the default (`spectral_core.display.limits.luminance.scene_white`).
     """
 
     name: str

@@ -6,9 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spectral_core.display.characterise import FOLDS, Characterisation, ModelResult, simplest_within_noise
-from spectral_core.display.fitting import MODEL_KINDS, ModelKind
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.characterising.characterise import (
+    FOLDS,
+    Characterisation,
+    ModelResult,
+    simplest_within_noise,
+)
+from spectral_core.display.measuring.measurements import Measurements
+from spectral_core.display.models.fitting import MODEL_KINDS, ModelKind
 from spectral_core.report.numerals import count, fixed
 
 

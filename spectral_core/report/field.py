@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from spectral_core.display.field import FieldReport, PatchReport
+from spectral_core.display.judging.field import FieldReport, PatchReport
 from spectral_core.files import atomic_path
 from spectral_core.report.extras import extra
 from spectral_core.report.figures import GRID, INK, new_figure, style

@@ -110,7 +110,7 @@ def textured(textured_toml: Path) -> bpy.types.Scene:
 def simulated_profile() -> Callable[[str], DisplayProfile]:
     """A profile of a kind of model, fitted to a simulated headset; any other name is a built-in one."""
     from spectral_core.display import load_profile
-    from spectral_core.display.fitting import MODEL_KINDS
+    from spectral_core.display.models.fitting import MODEL_KINDS
 
     def profile(name: str) -> DisplayProfile:
         kinds = {kind.name: kind for kind in MODEL_KINDS}

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from spectral_core.cli import main
+from spectral_core.display.judging.shown import ShownPatch, compare_shown
 from spectral_core.display.profile import DisplayProfile
-from spectral_core.display.shown import ShownPatch, compare_shown
 
 Simulated = Callable[[str], DisplayProfile]
 

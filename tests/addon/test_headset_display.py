@@ -13,7 +13,7 @@ from blender_addon.bridge import headset, measure
 from blender_addon.bridge.render import render_linear
 from blender_addon.eyes import EYE_PROPERTY
 from spectral_core.display import load_profile, srgb_encode, write_profile
-from spectral_core.display.luminance import scene_white
+from spectral_core.display.limits.luminance import scene_white
 from spectral_core.standards import srgb_to_XYZ_matrix
 
 

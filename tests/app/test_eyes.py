@@ -11,7 +11,7 @@ import pytest
 from real_blender import WORK, Application, assert_clean
 
 from spectral_core.display import load_profile
-from spectral_core.display.luminance import scene_white
+from spectral_core.display.limits.luminance import scene_white
 from spectral_core.lighting import make_lighting
 from spectral_core.lights import Light
 from spectral_core.scene import load_scene

@@ -112,7 +112,7 @@ def test_the_headset_ran_and_the_head_moved(session: dict) -> None:
 
 
 def test_the_list_of_what_was_shown_pairs_with_the_readings(session: dict, tmp_path: Path) -> None:
-    from spectral_core.display.patches import pair
+    from spectral_core.display.measuring.patches import pair
 
     shown = FOLDER / "patches-shown.csv"
     with shown.open(encoding="utf-8") as stream:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.measuring.measurements import Measurements
 
 Display = Callable[[Float64Array], Float64Array]
 GAMMA = np.array([2.35, 2.30, 2.25])

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from spectral_core.arrays import Float64Array, frozen
-from spectral_core.display import advice as module
-from spectral_core.display.advice import advise
-from spectral_core.display.characterise import characterise, errors
-from spectral_core.display.measurements import Measurements
-from spectral_core.display.patch_sets import PUBLISHED, SMALLEST, extension, published_protocol, starting_set
-from spectral_core.display.simulated import assumed_display, simulated
+from spectral_core.display.characterising import advice as module
+from spectral_core.display.characterising.advice import advise
+from spectral_core.display.characterising.characterise import characterise, errors
+from spectral_core.display.characterising.simulated import assumed_display, simulated
+from spectral_core.display.measuring.measurements import Measurements
+from spectral_core.display.measuring.patch_sets import PUBLISHED, SMALLEST, extension, published_protocol, starting_set
 
 Run = Callable[..., tuple[int, str, str]]
 ANCHORS = np.array([[0, 0, 0], [1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)

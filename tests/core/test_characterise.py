@@ -11,12 +11,12 @@ import pytest
 
 from spectral_core.arrays import frozen
 from spectral_core.display import DisplayProfile, read_profile, write_profile
-from spectral_core.display.characterise import characterise, errors
-from spectral_core.display.checks import check
-from spectral_core.display.curves import fit_curve
-from spectral_core.display.fitting import MODEL_KINDS
-from spectral_core.display.measurements import Measurements, read_measurements
+from spectral_core.display.characterising.characterise import characterise, errors
+from spectral_core.display.characterising.checks import check
+from spectral_core.display.measuring.measurements import Measurements, read_measurements
 from spectral_core.display.models import DisplayModel
+from spectral_core.display.models.curves import fit_curve
+from spectral_core.display.models.fitting import MODEL_KINDS
 from spectral_core.errors import DisplayError
 
 Run = Callable[..., tuple[int, str, str]]

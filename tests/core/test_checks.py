@@ -11,9 +11,9 @@ import pytest
 
 from spectral_core import weights
 from spectral_core.arrays import Float64Array, frozen
-from spectral_core.display.checks import check
-from spectral_core.display.measurements import Measurements, read_measurements
-from spectral_core.display.verdicts import Verdict
+from spectral_core.display.characterising.checks import check
+from spectral_core.display.characterising.verdicts import Verdict
+from spectral_core.display.measuring.measurements import Measurements, read_measurements
 from spectral_core.errors import DisplayError
 from spectral_core.standards import observer_table
 

@@ -12,7 +12,7 @@ import pytest
 
 from spectral_core.cli.compare import compare_document
 from spectral_core.display import DisplayProfile, write_profile
-from spectral_core.display.comparison import Colours, compare, read_colours
+from spectral_core.display.judging.comparison import Colours, compare, read_colours
 from spectral_core.display.models import GammaMatrix
 
 Run = Callable[..., tuple[int, str, str]]

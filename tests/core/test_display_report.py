@@ -16,19 +16,17 @@ from test_report import Reader
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array, frozen
-from spectral_core.display.characterise import Characterisation, characterise
-from spectral_core.display.coverage import (
-    XYZ_to_xy,
+from spectral_core.chromaticities import XYZ_to_xy, uv_to_xy, xy_to_uv
+from spectral_core.display.characterising.characterise import Characterisation, characterise
+from spectral_core.display.judging.eyes import eye_difference
+from spectral_core.display.limits.coverage import (
     area,
     coverage,
     reference_volume,
     reference_xy,
-    uv_to_xy,
     volume,
-    xy_to_uv,
 )
-from spectral_core.display.eyes import eye_difference
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models import GammaMatrix
 from spectral_core.report.display_data import held_out, ramps
 from spectral_core.report.display_findings import what_is_missing, why_chosen

@@ -13,8 +13,7 @@ import pytest
 
 from spectral_core import standards
 from spectral_core.display import DisplayProfile, builtin_profile_names, load_profile, srgb_decode
-from spectral_core.display.characterise import characterise
-from spectral_core.display.corrected import CorrectedLut
+from spectral_core.display.characterising.characterise import characterise
 from spectral_core.display.export import (
     blender_config,
     export_cube,
@@ -26,8 +25,9 @@ from spectral_core.display.export import (
     read_back_ocio,
 )
 from spectral_core.display.export.icc import adaptation
-from spectral_core.display.stages import SRGB, Interaction, Power, Tables, stages
-from spectral_core.display.state import HeadsetState
+from spectral_core.display.measuring.state import HeadsetState
+from spectral_core.display.models.corrected import CorrectedLut
+from spectral_core.display.models.stages import SRGB, Interaction, Power, Tables, stages
 from spectral_core.errors import DisplayError, OutputError
 
 Run = Callable[..., tuple[int, str, str]]

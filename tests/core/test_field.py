@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spectral_core.display.field import field_report, fit_map, read_field
+from spectral_core.display.judging.field import field_report, fit_map, read_field
 from spectral_core.errors import DisplayError
 
 Run = Callable[..., tuple[int, str, str]]
@@ -173,7 +173,7 @@ def test_pictures_of_flat_fields_and_of_lines(run: Run, tmp_path: Path, Y: np.nd
 
 
 def test_a_centre_beside_the_centre_is_told() -> None:
-    from spectral_core.display.field import FieldReadings
+    from spectral_core.display.judging.field import FieldReadings
 
     points = GRID + np.array([1.0, 0.0])
     report = field_report((FieldReadings("white", points, luminance(points), None),))

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from spectral_core.display.chromaticities import uv, xy
 
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.display import builtin_profile_names, load_profile
-from spectral_core.display.chromaticities import uv, xy
-from spectral_core.display.fitting import MODEL_KINDS
-from spectral_core.display.gamut import GAMUT_RULES, map_to_gamut, peak_luminance
+from spectral_core.display.limits.gamut import GAMUT_RULES, map_to_gamut, peak_luminance
 from spectral_core.display.models import DisplayModel
+from spectral_core.display.models.fitting import MODEL_KINDS
 from spectral_core.errors import DisplayError
 from spectral_core.lights import Light
 

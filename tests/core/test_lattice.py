@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from spectral_core.display.curves import ToneCurve
-from spectral_core.display.lattice import LatticeTable, lattice
+from spectral_core.display.models.curves import ToneCurve
+from spectral_core.display.models.lattice import LatticeTable, lattice
 from spectral_core.errors import DisplayError
 
 

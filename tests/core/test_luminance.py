@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from spectral_core.display import DisplayProfile, load_profile, write_profile
-from spectral_core.display.luminance import (
+from spectral_core.display.limits.luminance import (
     LuminanceMapping,
     SceneColour,
     map_luminance,

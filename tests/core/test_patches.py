@@ -14,10 +14,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from spectral_core.display.measurements import read_measurements
-from spectral_core.display.models import srgb_decode
-from spectral_core.display.patches import PatchList, pair, published_patches, read_patches, write_paired, write_patches
-from spectral_core.display.playback import (
+from spectral_core.display.measuring.measurements import read_measurements
+from spectral_core.display.measuring.patches import (
+    PatchList,
+    pair,
+    published_patches,
+    read_patches,
+    write_paired,
+    write_patches,
+)
+from spectral_core.display.measuring.playback import (
     SHOWN_FILE,
     STATE_FILE,
     Pace,
@@ -26,6 +32,7 @@ from spectral_core.display.playback import (
     write_shown,
     write_state,
 )
+from spectral_core.display.models import srgb_decode
 from spectral_core.errors import DisplayError
 
 Run = Callable[..., tuple[int, str, str]]

@@ -13,13 +13,13 @@ import pytest
 
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.display import DisplayProfile, write_profile
-from spectral_core.display.characterise import characterise
-from spectral_core.display.correction import correct, correction_document, unreachable_document
-from spectral_core.display.measurements import Measurements, read_measurements
+from spectral_core.display.characterising.characterise import characterise
+from spectral_core.display.measuring.measurements import Measurements, read_measurements
 from spectral_core.display.models import GammaMatrix, srgb_decode, srgb_encode
-from spectral_core.display.probe import Probe, probe
-from spectral_core.display.probe_patches import probe_patches
-from spectral_core.display.runtimes import Runtime, combined_runtimes, single_runtimes
+from spectral_core.display.probing.correction import correct, correction_document, unreachable_document
+from spectral_core.display.probing.probe import Probe, probe
+from spectral_core.display.probing.probe_patches import probe_patches
+from spectral_core.display.probing.runtimes import Runtime, combined_runtimes, single_runtimes
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 Run = Callable[..., tuple[int, str, str]]

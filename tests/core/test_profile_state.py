@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from spectral_core.display import DisplayProfile, load_profile, read_profile, write_profile
-from spectral_core.display.measurements import read_measurements
+from spectral_core.display.measuring.measurements import read_measurements
+from spectral_core.display.measuring.state import HeadsetState, iso_date
 from spectral_core.display.models import GammaMatrix
-from spectral_core.display.state import HeadsetState, iso_date
 from spectral_core.errors import DisplayError
 
 Run = Callable[..., tuple[int, str, str]]

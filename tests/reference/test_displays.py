@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from spectral_core.display.characterise import characterise
-from spectral_core.display.checks import check
-from spectral_core.display.measurements import read_measurements
+from spectral_core.display.characterising.characterise import characterise
+from spectral_core.display.characterising.checks import check
+from spectral_core.display.measuring.measurements import read_measurements
 from spectral_core.errors import DisplayError
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from spectral_core.display import DisplayProfile, builtin_profile_names, load_profile
-from spectral_core.display.characterise import characterise
+from spectral_core.display.characterising.characterise import characterise
 from spectral_core.display.export import blender_config, export_icc, export_ocio, read_back_ocio
 from spectral_core.display.export.icc import D50, adaptation
 from spectral_core.display.export.read_back import probe_codes
-from spectral_core.display.measurements import read_measurements
+from spectral_core.display.measuring.measurements import read_measurements
 from spectral_core.errors import DisplayError
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 

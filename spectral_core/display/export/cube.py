@@ -11,8 +11,8 @@ from spectral_core import standards
 from spectral_core.arrays import Float64Array, FloatArray
 from spectral_core.display.export.luts import write_cube
 from spectral_core.display.export.names import export_name
-from spectral_core.display.lattice import lattice
 from spectral_core.display.models import srgb_decode, srgb_encode
+from spectral_core.display.models.lattice import lattice
 from spectral_core.display.profile import DisplayProfile
 
 CubeInput = Literal["srgb", "linear"]

@@ -17,11 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.display.corrected import drive_of_lightness
 from spectral_core.display.export.names import export_name
-from spectral_core.display.lattice import lattice
+from spectral_core.display.models.corrected import drive_of_lightness
+from spectral_core.display.models.lattice import lattice
+from spectral_core.display.models.stages import SHAPER, SRGB, Interaction, Power, Stages, Tables, stages
 from spectral_core.display.profile import DisplayProfile
-from spectral_core.display.stages import SHAPER, SRGB, Interaction, Power, Stages, Tables, stages
 from spectral_core.files import atomic_path
 
 D50 = np.array([0.9642, 1.0, 0.8249])

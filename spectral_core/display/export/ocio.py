@@ -23,8 +23,8 @@ import numpy as np
 from spectral_core.arrays import Float64Array
 from spectral_core.display.export.luts import write_cube, write_spi1d
 from spectral_core.display.export.names import export_name
+from spectral_core.display.models.stages import SHAPER, Power, Stages, Tables, stages
 from spectral_core.display.profile import DisplayProfile
-from spectral_core.display.stages import SHAPER, Power, Stages, Tables, stages
 from spectral_core.errors import DisplayError, OutputError
 from spectral_core.files import atomic_path, is_file, read_text
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from spectral_core import standards
 from spectral_core.arrays import BoolArray, Float64Array
-from spectral_core.display.corrected import drive_of_lightness
 from spectral_core.display.export.cube import CubeInput, cube_input
 from spectral_core.display.export.icc import D50, adaptation
 from spectral_core.display.export.ocio import OcioExport
+from spectral_core.display.models.corrected import drive_of_lightness
 from spectral_core.display.profile import DisplayProfile
 from spectral_core.imaging import error_text, oiio
 

@@ -19,10 +19,10 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.display.builtin import srgb
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models import DisplayModel
-from spectral_core.display.references import AssumedPanel, ProfiledPanel, Reference
-from spectral_core.display.runtimes import Runtime, combined_runtimes, single_runtimes
+from spectral_core.display.probing.references import AssumedPanel, ProfiledPanel, Reference
+from spectral_core.display.probing.runtimes import Runtime, combined_runtimes, single_runtimes
 from spectral_core.errors import DisplayError
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.display.models import srgb_decode, srgb_encode
-from spectral_core.display.runtimes import Runtime
+from spectral_core.display.probing.runtimes import Runtime
 from spectral_core.files import atomic_path
 
 # A node for every 8-bit code and one between: linear interpolation then costs less than rounding.

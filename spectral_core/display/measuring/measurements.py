@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array, frozen
-from spectral_core.display.cgats import parse_cgats
-from spectral_core.display.contradictions import refuse_contradictions
-from spectral_core.display.emission import Agreement, Emission, agreement, emission, wavelength
-from spectral_core.display.state import iso_date
+from spectral_core.display.measuring.cgats import parse_cgats
+from spectral_core.display.measuring.contradictions import refuse_contradictions
+from spectral_core.display.measuring.emission import Agreement, Emission, agreement, emission, wavelength
+from spectral_core.display.measuring.state import iso_date
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
 from spectral_core.standards import DEFAULT_OBSERVER

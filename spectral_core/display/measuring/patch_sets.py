@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array
-from spectral_core.display.measurements import SAME_CODE
+from spectral_core.display.measuring.measurements import SAME_CODE
 from spectral_core.standards import XYZ_to_Lab
 
 SMALLEST = 18

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from spectral_core.display.patches import SHOWN_HEADER, PatchList, codes_text
+from spectral_core.display.measuring.patches import SHOWN_HEADER, PatchList, codes_text
 from spectral_core.errors import DisplayError
 from spectral_core.files import atomic_path
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array, FloatArray, in_blocks
-from spectral_core.display.curves import ToneCurve
-from spectral_core.display.lattice import LatticeTable, lattice
 from spectral_core.display.models import checked_matrix, checked_vector
-from spectral_core.display.tone_models import LutMatrix, curves_from_json
+from spectral_core.display.models.curves import ToneCurve
+from spectral_core.display.models.lattice import LatticeTable, lattice
+from spectral_core.display.models.tone_models import LutMatrix, curves_from_json
 
 LENGTHS = (0.3, 0.5, 0.8, 1.2, 1.8)
 RIDGES = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)

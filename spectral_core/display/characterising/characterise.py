@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
-from spectral_core.display.checks import Checks, check
-from spectral_core.display.fitting import MODEL_KINDS, ModelKind, gamma_fit, ramp_drive
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.characterising.checks import Checks, check
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models import DisplayModel
+from spectral_core.display.models.fitting import MODEL_KINDS, ModelKind, gamma_fit, ramp_drive
 from spectral_core.errors import DisplayError
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 from spectral_core.verification import Percentiles, percentiles

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array
-from spectral_core.display.fitting import channel_lut
-from spectral_core.display.measurements import SAME_CODE, Measurements
-from spectral_core.display.noise import noisy
-from spectral_core.display.tone_models import LutMatrix
+from spectral_core.display.characterising.noise import noisy
+from spectral_core.display.measuring.measurements import SAME_CODE, Measurements
+from spectral_core.display.models.fitting import channel_lut
+from spectral_core.display.models.tone_models import LutMatrix
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 _NO_RAMPS = "measure ramps of each channel and of grey to learn of their shape"

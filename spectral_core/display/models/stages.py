@@ -15,9 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import Float64Array, FloatArray, frozen
-from spectral_core.display.corrected import CorrectedLut, drive_of_lightness, lightness
-from spectral_core.display.curves import ToneCurve
-from spectral_core.display.lattice import LatticeTable, lattice
 from spectral_core.display.models import (
     DisplayModel,
     GammaMatrix,
@@ -26,7 +23,10 @@ from spectral_core.display.models import (
     srgb_decode,
     srgb_encode,
 )
-from spectral_core.display.tone_models import GainOffsetGamma, LutMatrix
+from spectral_core.display.models.corrected import CorrectedLut, drive_of_lightness, lightness
+from spectral_core.display.models.curves import ToneCurve
+from spectral_core.display.models.lattice import LatticeTable, lattice
+from spectral_core.display.models.tone_models import GainOffsetGamma, LutMatrix
 from spectral_core.errors import DisplayError
 
 # Tables of curves are even in drive to this power, where a display's codes are nearly straight.

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.display.corrected import fit_correction
-from spectral_core.display.curves import fit_curve
-from spectral_core.display.measurements import Measurements
+from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models import DisplayModel, GammaMatrix
-from spectral_core.display.tone_models import GainOffsetGamma, LutMatrix
+from spectral_core.display.models.corrected import fit_correction
+from spectral_core.display.models.curves import fit_curve
+from spectral_core.display.models.tone_models import GainOffsetGamma, LutMatrix
 
 ASSUMED_GAMMA = 2.2
 

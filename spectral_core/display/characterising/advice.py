@@ -8,11 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.display.characterise import Characterisation, characterise, errors, held_out_errors, held_out_XYZ
-from spectral_core.display.fitting import MODEL_KINDS, ModelKind
-from spectral_core.display.measurements import Measurements
-from spectral_core.display.patch_sets import PUBLISHED, SMALLEST, extension, published_protocol, starting_set
-from spectral_core.display.simulated import SimulatedDisplay, assumed_display, simulated
+from spectral_core.display.characterising.characterise import (
+    Characterisation,
+    characterise,
+    errors,
+    held_out_errors,
+    held_out_XYZ,
+)
+from spectral_core.display.characterising.simulated import SimulatedDisplay, assumed_display, simulated
+from spectral_core.display.measuring.measurements import Measurements
+from spectral_core.display.measuring.patch_sets import PUBLISHED, SMALLEST, extension, published_protocol, starting_set
+from spectral_core.display.models.fitting import MODEL_KINDS, ModelKind
 from spectral_core.errors import DisplayError
 
 SIZES = (20, 30, 45, 60, 90, 140, PUBLISHED)

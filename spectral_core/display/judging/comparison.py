@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
-from spectral_core.display.measurements import SAME_CODE, read_measurements
+from spectral_core.display.measuring.measurements import SAME_CODE, read_measurements
 from spectral_core.display.profile import DisplayProfile
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text

@@ -10,7 +10,7 @@ import numpy as np
 from spectral_core.errors import DisplayError
 
 if TYPE_CHECKING:
-    from spectral_core.display.measurements import Measurements
+    from spectral_core.display.measuring.measurements import Measurements
 
 _FULL = {"white": (1.0, 1.0, 1.0), "red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0)}
 _AGAIN = "measure again with the display's state fixed"

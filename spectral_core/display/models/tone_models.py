@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import Float64Array, FloatArray, in_blocks
-from spectral_core.display.curves import ToneCurve
 from spectral_core.display.models import checked_matrix, checked_vector, signed_power
+from spectral_core.display.models.curves import ToneCurve
 from spectral_core.errors import DisplayError
 
 

@@ -7,9 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
-from spectral_core.display.measurements import Measurements
-from spectral_core.display.repeats import clipping, drift, duplicates, instrument_noise, noise, reading_noise
-from spectral_core.display.verdicts import (
+from spectral_core.display.characterising.repeats import (
+    clipping,
+    drift,
+    duplicates,
+    instrument_noise,
+    noise,
+    reading_noise,
+)
+from spectral_core.display.characterising.verdicts import (
     ADDITIVE_PERCENT,
     Verdict,
     mixes_add_up,
@@ -17,6 +23,7 @@ from spectral_core.display.verdicts import (
     saturation,
     untold,
 )
+from spectral_core.display.measuring.measurements import Measurements
 
 # In percent of white: above it the contrast is below 100:1, which is stray light or a lifted black.
 # Black of the published headset is 0.4 %.

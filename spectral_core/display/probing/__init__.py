@@ -1,0 +1,1 @@
+"""Probing a headset's runtime: what it does to codes on their way to the panel, and what undoes it."""
