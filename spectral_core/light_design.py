@@ -14,6 +14,7 @@ import numpy as np
 
 from spectral_core import standards, weights
 from spectral_core.arrays import Float64Array
+from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.errors import LightError
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
@@ -52,10 +53,10 @@ def two_peak_metamer(
         )
     target = np.asarray(target_xy, dtype=np.float64)
     first = _line_XYZ(first_peak_nm, observer)
-    direction = target - _xy(first)
+    direction = target - XYZ_to_xy(first)
 
     def side(wavelength: float) -> float:
-        offset = _xy(_line_XYZ(wavelength, observer)) - target
+        offset = XYZ_to_xy(_line_XYZ(wavelength, observer)) - target
         return float(direction[0] * offset[1] - direction[1] * offset[0])
 
     for low, high in itertools.pairwise(np.arange(shortest, longest + 1)):
@@ -63,7 +64,7 @@ def two_peak_metamer(
             continue
         wavelength = _bisect(side, low, high)
         second = _line_XYZ(wavelength, observer)
-        if (_xy(second) - target) @ direction <= 0:
+        if (XYZ_to_xy(second) - target) @ direction <= 0:
             continue
         powers = _mixing_powers(first, second, target)
         if (powers > 0).all():
@@ -137,10 +138,6 @@ def builtin_design(name: str) -> Light:
 
 def _line_XYZ(wavelength: float, observer: str) -> Float64Array:
     return np.asarray(weights.colour_matching(np.array([wavelength]), observer)[0])
-
-
-def _xy(XYZ: Float64Array) -> Float64Array:
-    return np.asarray(XYZ[:2] / XYZ.sum())
 
 
 def _bisect(function: Callable[[float], float], low: float, high: float) -> float:

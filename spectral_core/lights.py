@@ -16,6 +16,7 @@ import numpy as np
 
 from spectral_core import standards, weights
 from spectral_core.arrays import BoolArray, Float64Array, frozen
+from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.errors import LightError, SpectrumError
 from spectral_core.files import is_file
 from spectral_core.spectra import Spectra, read_spectra
@@ -145,8 +146,7 @@ class Light:
 
     def xy(self, observer: str = DEFAULT_OBSERVER) -> Float64Array:
         """Chromaticity (2,)."""
-        XYZ = self.XYZ(observer)
-        return np.asarray(XYZ[:2] / XYZ.sum())
+        return XYZ_to_xy(self.XYZ(observer))
 
     def weighting_factors(
         self, bands_nm: Float64Array, observer: str = DEFAULT_OBSERVER, interpolation: str = "cubic"

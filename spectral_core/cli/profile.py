@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 import click
 import numpy as np
 
+from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.cli.console import Document, emit, facts
 from spectral_core.cli.export import export
 from spectral_core.cli.options import FiniteRange, as_json
 from spectral_core.display import DisplayProfile, load_profile, write_profile
-from spectral_core.display.chromaticities import xy
 from spectral_core.display.limits.luminance import scene_white
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.measuring.state import EYES, HeadsetState
@@ -148,9 +148,9 @@ def profile_document(display: DisplayProfile) -> Document:
         "unit": display.unit,
         "white_Y": display.white_Y,
         "white_XYZ": white.tolist(),
-        "white_xy": xy(white).tolist(),
+        "white_xy": XYZ_to_xy(white).tolist(),
         "primaries": {
-            channel: {"xy": xy(XYZ).tolist(), "Y": float(XYZ[1])}
+            channel: {"xy": XYZ_to_xy(XYZ).tolist(), "Y": float(XYZ[1])}
             for channel, XYZ in zip(_CHANNELS, primaries, strict=True)
         },
         "black_XYZ": black.tolist(),

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core import standards
-from spectral_core.arrays import Float64Array
+from spectral_core.chromaticities import xyY_to_XYZ
 from spectral_core.display.models import GammaMatrix, SRGBCurve
 from spectral_core.display.profile import DisplayProfile, read_profile
 
@@ -41,7 +41,7 @@ def _htc_vive_2020() -> DisplayProfile:
     """Primaries scaled per channel so that they sum to the measured white (the headset is not
     additive: unscaled they sum to 113.5 %), black added.
     """
-    XYZ = {name: _xyY_to_XYZ(*values) / 100 for name, values in _TABLE_1.items()}
+    XYZ = {name: xyY_to_XYZ(np.array(values)) / 100 for name, values in _TABLE_1.items()}
     primaries = np.stack([XYZ["red"], XYZ["green"], XYZ["blue"]], axis=1)
     matrix = primaries * np.linalg.solve(primaries, XYZ["white"])
     model = GammaMatrix(np.array([2.43, 2.38, 2.38]), matrix, XYZ["black"])
@@ -68,7 +68,3 @@ def load_profile(name_or_path: str | Path) -> DisplayProfile:
         if str(name_or_path).casefold() == name.casefold():
             return make()
     return read_profile(Path(name_or_path))
-
-
-def _xyY_to_XYZ(x: float, y: float, Y: float) -> Float64Array:
-    return np.array([x / y * Y, Y, (1 - x - y) / y * Y])

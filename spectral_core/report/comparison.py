@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from spectral_core.arrays import Float64Array
+from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.display.judging.comparison import Comparison
 from spectral_core.report.diagram import CIE_1931, background
 from spectral_core.report.extras import extra
@@ -28,7 +29,7 @@ def write_comparison_plot(compared: Comparison, path: Path) -> None:
     """Draw the pairs to ``.png`` or ``.svg``: lines from predicted to measured xy, and a histogram of dE00."""
     lit = compared.measured_XYZ[:, 1] > _DARK * compared.white_XYZ[1]
     lit &= compared.predicted_XYZ[:, 1] > _DARK * compared.white_XYZ[1]
-    start, end = (_xy(each[lit]) for each in (compared.predicted_XYZ, compared.measured_XYZ))
+    start, end = (XYZ_to_xy(each[lit]) for each in (compared.predicted_XYZ, compared.measured_XYZ))
     centre, width = _limits(np.concatenate([start, end]))
     magnified = _magnification(start, end, width)
     figure = new_figure(9.6, 4.9)
@@ -41,10 +42,6 @@ def write_comparison_plot(compared: Comparison, path: Path) -> None:
         _draw_labels(diagram, int(len(lit) - lit.sum()), magnified)
         _draw_histogram(histogram, compared.dE00, colours, scale)
     write_figure(figure, path)
-
-
-def _xy(XYZ: Float64Array) -> Float64Array:
-    return np.asarray(XYZ[:, :2] / XYZ.sum(axis=1, keepdims=True))
 
 
 def _magnification(start: Float64Array, end: Float64Array, width: float) -> int:

@@ -11,8 +11,8 @@ import numpy as np
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array, frozen
+from spectral_core.chromaticities import XYZ_to_xy, uv_to_xy, xy_to_uv
 from spectral_core.display import srgb, srgb_encode
-from spectral_core.display.limits.coverage import uv_to_xy, xy_to_uv
 from spectral_core.report.figures import INK
 
 # Second radiation constant of Planck's law, ITS-90 as CIE 15 uses it, in nm K.
@@ -39,7 +39,7 @@ def spectrum_locus() -> tuple[Float64Array, Float64Array]:
     wavelengths, cmfs = standards.observer_table()
     # Beyond 700 nm the chromaticity no longer changes; the table's last digits would make it wander.
     known = (wavelengths >= 380) & (wavelengths <= 700)
-    return frozen(wavelengths[known]), frozen(cmfs[known, :2] / cmfs[known].sum(axis=1, keepdims=True))
+    return frozen(wavelengths[known]), frozen(XYZ_to_xy(cmfs[known]))
 
 
 def planckian_xy(temperatures_K: Float64Array) -> Float64Array:
@@ -48,7 +48,7 @@ def planckian_xy(temperatures_K: Float64Array) -> Float64Array:
     nm = wavelengths[:, None]
     power = nm**-5.0 / np.expm1(_C2_NM_K / (nm * temperatures_K))
     XYZ = power.T @ cmfs
-    return np.asarray(XYZ[:, :2] / XYZ.sum(axis=1, keepdims=True))
+    return XYZ_to_xy(XYZ)
 
 
 def daylight_xy(temperatures_K: Float64Array) -> Float64Array:

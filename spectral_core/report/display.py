@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import spectral_core
+from spectral_core.chromaticities import XYZ_to_xy, xy_to_uv
 from spectral_core.display.characterising.characterise import Characterisation
 from spectral_core.display.characterising.verdicts import ADDITIVE_PERCENT
 from spectral_core.display.judging.eyes import eye_difference
-from spectral_core.display.limits.coverage import XYZ_to_xy, xy_to_uv
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.report import display_findings, display_plots, display_tables
 from spectral_core.report.display_data import DARK_GREY, held_out, ramps, visible_greys

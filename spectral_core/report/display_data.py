@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import Float64Array
+from spectral_core.chromaticities import XYZ_to_uv
 from spectral_core.display.characterising.characterise import Characterisation
-from spectral_core.display.limits.coverage import XYZ_to_xy, xy_to_uv
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models.fitting import primaries
 from spectral_core.standards import XYZ_to_Lab
@@ -168,8 +168,8 @@ def held_out(found: Characterisation) -> HeldOut | None:
         XYZ_to_Lab(result.held_out_XYZ, white),
         measured.XYZ / white,
         result.held_out_XYZ / white,
-        np.where(lit[:, None], xy_to_uv(XYZ_to_xy(np.where(lit[:, None], measured.XYZ, white))), np.nan),
-        xy_to_uv(XYZ_to_xy(primaries_XYZ(found.measured))),
+        np.where(lit[:, None], XYZ_to_uv(np.where(lit[:, None], measured.XYZ, white)), np.nan),
+        XYZ_to_uv(primaries_XYZ(found.measured)),
         result.held_out_errors,
     )
 

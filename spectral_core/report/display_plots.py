@@ -10,8 +10,9 @@ import numpy as np
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array
+from spectral_core.chromaticities import XYZ_to_uv, XYZ_to_xy, xy_to_uv
 from spectral_core.display.characterising.characterise import Characterisation
-from spectral_core.display.limits.coverage import XYZ_to_xy, reference_xy, xy_to_uv
+from spectral_core.display.limits.coverage import reference_xy
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.report.diagram import CIE_1976, background, daylight_xy, planckian_xy, wavelength_labels
 from spectral_core.report.display_data import HeldOut, Ramp, primaries_XYZ
@@ -44,7 +45,7 @@ def gamut_plot(eyes: Mapping[str, Measurements]) -> str:
         _triangles(whole, eyes)
         wavelength_labels(whole, CIE_1976)
         whole.set(xlim=(-0.03, CIE_1976.extent[1]), ylim=(-0.02, 0.62))
-        whites = {name: _uv(each.white_XYZ) for name, each in eyes.items()}
+        whites = {name: XYZ_to_uv(each.white_XYZ) for name, each in eyes.items()}
         _whites(near, whites)
     return svg_uri(figure)
 
@@ -54,9 +55,9 @@ def _triangles(axes: Any, eyes: Mapping[str, Measurements]) -> None:
         corners = xy_to_uv(reference_xy(name))[[0, 1, 2, 0]]
         axes.plot(*corners.T, color=colour, linestyle=dashes, linewidth=1.5, label=name)
     for (name, measured), (colour, dashes, marker) in zip(eyes.items(), _EYE_LINES, strict=False):
-        corners = _uv(primaries_XYZ(measured))[[0, 1, 2, 0]]
+        corners = XYZ_to_uv(primaries_XYZ(measured))[[0, 1, 2, 0]]
         axes.plot(*corners.T, color=colour, linestyle=dashes, linewidth=2.0, marker=marker, markersize=5, label=name)
-        axes.plot(*_uv(measured.white_XYZ), marker, color=colour, markersize=4, markeredgecolor="white")
+        axes.plot(*XYZ_to_uv(measured.white_XYZ), marker, color=colour, markersize=4, markeredgecolor="white")
     axes.legend(loc="lower right", frameon=False, fontsize=8.5)
 
 
@@ -65,7 +66,7 @@ def _whites(axes: Any, whites: Mapping[str, Float64Array]) -> None:
     axes.plot(*xy_to_uv(planckian_xy(temperatures)).T, color=MUTED, linewidth=1.0, label="Planckian locus")
     daylight = xy_to_uv(daylight_xy(temperatures[temperatures >= 5000]))
     axes.plot(*daylight.T, color=INK, linewidth=1.1, linestyle=(0, (3, 2)), label="CIE daylight")
-    d65 = _uv(standards.srgb_to_XYZ_matrix().sum(axis=1))
+    d65 = XYZ_to_uv(standards.srgb_to_XYZ_matrix().sum(axis=1))
     axes.plot(*d65, "x", color="#d55e00", markersize=8, markeredgewidth=2, label="D65")
     for (name, place), (colour, _, marker) in zip(whites.items(), _EYE_LINES, strict=False):
         axes.plot(*place, marker, color=colour, markersize=6, markeredgecolor="white", label=f"white, {name}", zorder=5)
@@ -150,7 +151,10 @@ def grey_plot(greys: Mapping[str, Measurements], found: Mapping[str, Characteris
         for (name, grey), (colour, _, marker) in zip(greys.items(), _EYE_LINES, strict=False):
             white, model = found[name].measured.white_XYZ, found[name].chosen.model
             codes = grey.codes[:, 0]
-            uv, modelled = _uv(grey.XYZ) - _uv(white), _uv(model.forward(grey.codes)) - _uv(white)
+            uv, modelled = (
+                XYZ_to_uv(grey.XYZ) - XYZ_to_uv(white),
+                XYZ_to_uv(model.forward(grey.codes)) - XYZ_to_uv(white),
+            )
             left.plot(
                 codes, _cct(grey.XYZ), marker, color=colour, markersize=3.5, fillstyle="none", label=f"{name}, measured"
             )
@@ -252,7 +256,3 @@ def additivity_plot(measured: Measurements) -> str:
         axes.tick_params(axis="y", length=0)
         figure.legend(loc="outside upper center", ncols=4, frameon=False, fontsize=8.5)
     return svg_uri(figure)
-
-
-def _uv(XYZ: Float64Array) -> Float64Array:
-    return xy_to_uv(XYZ_to_xy(XYZ))

@@ -10,17 +10,16 @@ import numpy as np
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array
+from spectral_core.chromaticities import XYZ_to_uv, XYZ_to_xy, xy_to_uv
 from spectral_core.display import srgb
 from spectral_core.display.characterising.characterise import Characterisation, ModelResult
 from spectral_core.display.judging.eyes import EyeDifference
 from spectral_core.display.limits.coverage import (
     Coverage,
-    XYZ_to_xy,
     coverage,
     reference_volume,
     reference_xy,
     volume,
-    xy_to_uv,
 )
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.report.display_data import HeldOut, primaries_XYZ, worst
@@ -162,7 +161,7 @@ def eyes_table(
     """Both eyes side by side with their differences."""
     whites = [each.white_XYZ for each in read]
     ratio = difference.luminance_ratio
-    places = np.array([xy_to_uv(XYZ_to_xy(white)) for white in whites])
+    places = np.array([XYZ_to_uv(white) for white in whites])
     gammas = [[value if r2 else None for value, r2 in each.gamma.values()] for each in found]
     held = [each.chosen.held_out for each in found]
     shared = (difference.right_for_left, difference.left_for_right)

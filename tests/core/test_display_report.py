@@ -16,17 +16,15 @@ from test_report import Reader
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array, frozen
+from spectral_core.chromaticities import XYZ_to_xy, uv_to_xy, xy_to_uv
 from spectral_core.display.characterising.characterise import Characterisation, characterise
 from spectral_core.display.judging.eyes import eye_difference
 from spectral_core.display.limits.coverage import (
-    XYZ_to_xy,
     area,
     coverage,
     reference_volume,
     reference_xy,
-    uv_to_xy,
     volume,
-    xy_to_uv,
 )
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models import GammaMatrix

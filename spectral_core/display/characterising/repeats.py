@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray
+from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.display.characterising.verdicts import Verdict, untold
 from spectral_core.display.measuring.measurements import SAME_CODE, Measurements
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
@@ -134,7 +135,7 @@ def _bright_repeats(measured: Measurements) -> tuple[Float64Array, int]:
     group, count = _groups(measured.codes[bright])
     XYZ = measured.XYZ[bright]
     place = np.linspace(0.0, 1.0, len(measured.codes))[bright]
-    values = np.column_stack([np.log(XYZ[:, 1]), XYZ[:, :2] / XYZ.sum(axis=1, keepdims=True), place])
+    values = np.column_stack([np.log(XYZ[:, 1]), XYZ_to_xy(XYZ), place])
     means = np.stack([np.bincount(group, column) / count for column in values.T], axis=1)
     return np.asarray((values - means[group])[count[group] > 1]), int((count - 1).sum())
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
+from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.display.builtin import load_profile
 from spectral_core.display.characterising.characterise import Characterisation
 from spectral_core.display.characterising.noise import noisy
@@ -89,7 +90,7 @@ def _noise(found: Characterisation) -> tuple[float, float]:
         return ASSUMED_NOISE
     bright = measured.XYZ[:, 1] > _BRIGHT
     XYZ, fitted = measured.XYZ[bright], found.chosen.model.forward(measured.codes[bright])
-    xy_error = XYZ[:, :2] / XYZ.sum(axis=1, keepdims=True) - fitted[:, :2] / fitted.sum(axis=1, keepdims=True)
+    xy_error = XYZ_to_xy(XYZ) - XYZ_to_xy(fitted)
     return _robust_deviation(np.log(XYZ[:, 1] / fitted[:, 1])), _robust_deviation(xy_error)
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spectral_core.chromaticities import XYZ_to_uv
 from spectral_core.display.characterising.characterise import Characterisation, errors
-from spectral_core.display.limits.coverage import XYZ_to_xy, xy_to_uv
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.verification import Percentiles, percentiles
 
@@ -38,7 +38,7 @@ def eye_difference(
 ) -> EyeDifference:
     """Compare two eyes that were characterised from `left_read` and `right_read`, in their files' units."""
     absolute = left_read.unit == right_read.unit == "cd/m2"
-    whites = xy_to_uv(XYZ_to_xy(np.stack([left_read.white_XYZ, right_read.white_XYZ])))
+    whites = XYZ_to_uv(np.stack([left_read.white_XYZ, right_read.white_XYZ]))
     return EyeDifference(
         float(right_read.white_XYZ[1] / left_read.white_XYZ[1]) if absolute else None,
         float(np.hypot(*(whites[1] - whites[0]))),

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
-from spectral_core.display.chromaticities import uv
+from spectral_core.chromaticities import XYZ_to_uv
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
@@ -261,7 +261,7 @@ def _patch_report(patch: FieldReadings, white_XYZ: Float64Array | None) -> Patch
         Lab = XYZ_to_Lab(middle, white_XYZ)
         dE00 = _span(delta_E_2000(XYZ_to_Lab(patch.XYZ, white_XYZ), Lab))
         chromatic = _span(delta_E_2000(XYZ_to_Lab(patch.XYZ / relative[:, None], white_XYZ), Lab))
-        delta_uv = _span(np.hypot(*(uv(patch.XYZ) - uv(middle)).T))
+        delta_uv = _span(np.hypot(*(XYZ_to_uv(patch.XYZ) - XYZ_to_uv(middle)).T))
     fitted = fit_map(patch.points_deg, relative)
     return PatchReport(
         name=patch.name,

@@ -10,6 +10,7 @@ import numpy as np
 
 from spectral_core import standards
 from spectral_core.arrays import Float64Array
+from spectral_core.chromaticities import XYZ_to_xy
 
 # Steps along each edge of the cube of codes; the volume of sRGB then changes by less than 0.1 %.
 _STEPS = 32
@@ -31,23 +32,6 @@ class Coverage:
 
     covered: float
     area: float
-
-
-def XYZ_to_xy(XYZ: Float64Array) -> Float64Array:
-    """CIE 1931 x, y (..., 2) of XYZ (..., 3)."""
-    return np.asarray(XYZ[..., :2] / XYZ.sum(axis=-1, keepdims=True))
-
-
-def xy_to_uv(xy: Float64Array) -> Float64Array:
-    """CIE 1976 u', v' (..., 2) of x, y (..., 2); CIE 15:2018."""
-    x, y = xy[..., 0], xy[..., 1]
-    return np.asarray(np.stack([4 * x, 9 * y], axis=-1) / (-2 * x + 12 * y + 3)[..., None])
-
-
-def uv_to_xy(uv: Float64Array) -> Float64Array:
-    """CIE 1931 x, y (..., 2) of u', v' (..., 2)."""
-    u, v = uv[..., 0], uv[..., 1]
-    return np.asarray(np.stack([9 * u, 4 * v], axis=-1) / (6 * u - 16 * v + 12)[..., None])
 
 
 def reference_xy(gamut: str) -> Float64Array:

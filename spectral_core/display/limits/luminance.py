@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array, FloatArray
-from spectral_core.display.chromaticities import uv
+from spectral_core.chromaticities import XYZ_to_uv
 from spectral_core.display.limits.gamut import map_to_gamut, peak_luminance, reach
 from spectral_core.display.profile import GAMUT_TOLERANCE, DisplayProfile
 from spectral_core.errors import DisplayError
@@ -231,7 +231,7 @@ def _outside(
     for index in chosen:
         XYZ = colours[index].XYZ * factor
         codes, _ = map_to_gamut(profile, XYZ, "chromaticity")
-        moved = float(np.hypot(*(uv(profile.to_XYZ(codes)) - uv(XYZ))))
+        moved = float(np.hypot(*(XYZ_to_uv(profile.to_XYZ(codes)) - XYZ_to_uv(XYZ))))
         x, y = (XYZ[:2] / XYZ.sum()).tolist()
         found.append(OutsideChromaticity(colours[index].name, colours[index].light, (x, y), moved))
     return tuple(sorted(found, key=lambda each: -each.delta_uv))
