@@ -19,8 +19,8 @@ import numpy as np
 
 from spectral_core.arrays import frozen
 from spectral_core.display.characterising.simulated import assumed_display
-from spectral_core.display.measuring.patches import published_patches
 from spectral_core.display.measuring.measurements import Measurements, read_measurements
+from spectral_core.display.measuring.patches import published_patches
 from spectral_core.display.models.fitting import MODEL_KINDS
 
 PIXELS = 1_000_000

@@ -136,6 +136,11 @@ def delta_E_2000(Lab_a: Float64Array, Lab_b: Float64Array) -> Float64Array:
     return np.asarray(_colour().delta_E(Lab_a, Lab_b, method="CIE 2000"), dtype=np.float64)
 
 
+def dE00(XYZ_a: Float64Array, XYZ_b: Float64Array, white_XYZ: Float64Array) -> Float64Array:
+    """CIEDE2000 colour difference (...,) of two arrays of XYZ (..., 3) seen under a white XYZ (3,)."""
+    return delta_E_2000(XYZ_to_Lab(XYZ_a, white_XYZ), XYZ_to_Lab(XYZ_b, white_XYZ))
+
+
 def cct_and_duv(xy: Float64Array) -> tuple[float, float]:
     """Correlated colour temperature in kelvin and Duv of a CIE 1931 xy (2,), Ohno 2013."""
     colour = _colour()

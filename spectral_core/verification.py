@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from spectral_core import standards
 from spectral_core.arrays import Float64Array
 from spectral_core.display import srgb, srgb_encode
 from spectral_core.display.profile import in_gamut
 from spectral_core.lighting import WORKING_SPACE, Lighting
-from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 
 @dataclass(frozen=True)
@@ -248,7 +248,7 @@ def _codes(linear: Float64Array) -> Float64Array:
 def _dE00(rendered: Float64Array, exact: Float64Array, lighting: Lighting) -> Float64Array:
     white = lighting.light.XYZ() * lighting.luminance
     matrix = np.linalg.inv(srgb().to_linear(np.eye(3)).T)
-    return delta_E_2000(XYZ_to_Lab(rendered @ matrix.T, white), XYZ_to_Lab(exact @ matrix.T, white))
+    return standards.dE00(rendered @ matrix.T, exact @ matrix.T, white)
 
 
 def _per_patch(

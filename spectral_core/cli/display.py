@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import shlex
 import sys
 from dataclasses import asdict, replace
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import click
-import numpy as np
 
 from spectral_core.arrays import Float64Array
 from spectral_core.cli.console import Document, emit, progress_bar
@@ -25,6 +23,7 @@ from spectral_core.display.characterising.characterise import characterise as ch
 from spectral_core.display.judging.eyes import eye_difference
 from spectral_core.display.limits.gamut import GAMUT_RULES, GamutCounts, map_to_gamut
 from spectral_core.display.measuring.measurements import Measurements, read_measurements
+from spectral_core.display.measuring.tables import parse_table
 from spectral_core.display.models.fitting import MODEL_KINDS
 from spectral_core.documents import advice_document, characterise_document
 from spectral_core.errors import DisplayError
@@ -169,17 +168,12 @@ def _told(counts: GamutCounts) -> str:
 
 def _read(file: Path | None, header: list[str]) -> Float64Array:
     """The three columns (n, 3) under a header."""
-    where = file or Path("standard input")
+    path = file or Path("standard input")
     text = sys.stdin.read() if file is None else read_text(file, DisplayError, "give a CSV of colours")
-    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text)) if row]
-    if not rows or rows[0][:3] != header:
-        raise DisplayError(f"does not begin with the header {','.join(header)}", where=where, remedy="add it")
-    values = np.empty((len(rows) - 1, 3))
-    for index, row in enumerate(rows[1:]):
-        try:
-            values[index] = [float(cell) for cell in row[:3]]
-        except ValueError:
-            values[index] = np.nan
-        if not np.isfinite(values[index]).all():
-            raise DisplayError("no three finite numbers", where=f"{where}, line {index + 2}", remedy="correct the row")
-    return values
+    missing = DisplayError(f"does not begin with the header {','.join(header)}", where=path, remedy="add it")
+    if not text.strip():
+        raise missing
+    table = parse_table(text, path, "give a CSV of colours", least=0)
+    if list(table.header[:3]) != header:
+        raise missing
+    return table.numbers_at(range(3))

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from spectral_core.display.chromaticities import uv, xy
 
 from spectral_core.arrays import Float64Array, frozen
+from spectral_core.chromaticities import XYZ_to_uv, XYZ_to_xy
 from spectral_core.display import builtin_profile_names, load_profile
 from spectral_core.display.limits.gamut import GAMUT_RULES, map_to_gamut, peak_luminance
 from spectral_core.display.models import DisplayModel
@@ -78,7 +78,7 @@ def test_corrected_models_give_codes_too(name: str) -> None:
     peak = peak_luminance(model(name), np.maximum(asked, 0.05))
     bright = (asked > 0.05).all(axis=1) & (peak > 0) & (peak < asked[:, 1])
     assert bright.sum() > 3
-    np.testing.assert_allclose(xy(shown[bright]), xy(asked[bright]), atol=1e-6)
+    np.testing.assert_allclose(XYZ_to_xy(shown[bright]), XYZ_to_xy(asked[bright]), atol=1e-6)
     np.testing.assert_allclose(shown[bright, 1], peak[bright], rtol=1e-6)
 
 
@@ -114,7 +114,7 @@ def test_too_bright_a_colour_keeps_its_chromaticity(name: str, code: list[float]
     found, counts = map_to_gamut(model(name), XYZ, "chromaticity")
     shown = model(name).forward(found)
     if limit > 0:
-        np.testing.assert_allclose(xy(shown), xy(XYZ), atol=1e-6)
+        np.testing.assert_allclose(XYZ_to_xy(shown), XYZ_to_xy(XYZ), atol=1e-6)
         assert shown[1] == pytest.approx(min(limit, 1.0) * XYZ[1], rel=1e-9)
         assert peak_luminance(model(name), XYZ) == pytest.approx(limit * XYZ[1], rel=1e-9)
     # Within a thousandth of fitting, clipping may change less than is counted.
@@ -136,8 +136,8 @@ def test_foreign_chromaticities_move_straight_to_the_gamuts_edge(name: str) -> N
         assert shown[1] == pytest.approx(asked[1], rel=1e-6)
         black, white = display.forward(np.zeros(3)), display.forward(np.ones(3))
         share = (asked[1] - black[1]) / (white[1] - black[1])
-        start, end = uv(asked), uv(black + share * (white - black))
-        along, moved = end - start, uv(shown) - start
+        start, end = XYZ_to_uv(asked), XYZ_to_uv(black + share * (white - black))
+        along, moved = end - start, XYZ_to_uv(shown) - start
         assert abs(along[0] * moved[1] - along[1] * moved[0]) / np.hypot(*along) < 1e-6
         assert 0 < moved @ along < along @ along
         # A step back towards the colour leaves the gamut: it moved no further than it must.
@@ -152,7 +152,7 @@ def test_the_way_to_the_edge_has_no_step() -> None:
     path = white + np.linspace(0.8, 1.2, 400)[:, None] * (red - white)
     found, _ = map_to_gamut(display, path * (0.9 / path[:, 1:2]), "chromaticity")
     shown = display.forward(found)
-    assert np.abs(np.diff(uv(shown), axis=0)).max() < 2e-3
+    assert np.abs(np.diff(XYZ_to_uv(shown), axis=0)).max() < 2e-3
     assert np.abs(np.diff(shown[:, 1])).max() < 5e-3
 
 
@@ -213,5 +213,5 @@ def test_convert_takes_a_rule_and_counts(run: Run, tmp_path: Path) -> None:
     assert shown["keep"].max() > 1
     assert shown["chromaticity"][1].max() == pytest.approx(1)
     kept = load_profile("sRGB").to_XYZ(shown["chromaticity"][1])
-    np.testing.assert_allclose(xy(kept), xy(np.array([1.9, 2.0, 2.1])), atol=1e-6)
+    np.testing.assert_allclose(XYZ_to_xy(kept), XYZ_to_xy(np.array([1.9, 2.0, 2.1])), atol=1e-6)
     assert run("convert", "--to", "codes", "--gamut", "squeeze", path)[0] == 2

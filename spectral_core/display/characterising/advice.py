@@ -17,11 +17,13 @@ from spectral_core.display.characterising.characterise import (
 )
 from spectral_core.display.characterising.simulated import SimulatedDisplay, assumed_display, simulated
 from spectral_core.display.measuring.measurements import Measurements
-from spectral_core.display.measuring.patch_sets import PUBLISHED, SMALLEST, extension, published_protocol, starting_set
+from spectral_core.display.measuring.patch_sets import SMALLEST, extension, starting_set
+from spectral_core.display.measuring.patches import published_patches
 from spectral_core.display.models.fitting import MODEL_KINDS, ModelKind
 from spectral_core.errors import DisplayError
 
-SIZES = (20, 30, 45, 60, 90, 140, PUBLISHED)
+# The last is the size of the published protocol.
+SIZES = (20, 30, 45, 60, 90, 140, 234)
 LARGEST = 500
 _MORE = (30, 90)
 # A set this little larger than the measured one is no advice.
@@ -114,7 +116,7 @@ def _sets(known: Float64Array | None, patches: int | None, display: SimulatedDis
     sizes = [size for size in SIZES if known is None or size < measured]
     sets = [("new", starting_set(size, display.XYZ)) for size in sizes]
     if known is None:
-        sets.append(("published", published_protocol(display.XYZ)))
+        sets.append(("published", published_patches().codes))
         return sets if patches is None else [*sets, ("new", starting_set(patches, display.XYZ))]
     if measured >= SMALLEST:
         sets.append(("measured", known))

@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from spectral_core import standards
 from spectral_core.arrays import Float64Array, IntArray, frozen
 from spectral_core.display.characterising.checks import Checks, check
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.models import DisplayModel
 from spectral_core.display.models.fitting import MODEL_KINDS, ModelKind, gamma_fit, ramp_drive
 from spectral_core.errors import DisplayError
-from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 from spectral_core.verification import Percentiles, percentiles
 
 FOLDS = 5
@@ -105,7 +105,7 @@ def folds(measured: Measurements) -> list[IntArray]:
 def errors(model: DisplayModel, measured: Measurements, white_XYZ: Float64Array) -> Float64Array:
     """dE00 (n,) of a model's XYZ from the measured."""
     predicted = model.forward(measured.codes)
-    return delta_E_2000(XYZ_to_Lab(predicted, white_XYZ), XYZ_to_Lab(measured.XYZ, white_XYZ))
+    return standards.dE00(predicted, measured.XYZ, white_XYZ)
 
 
 def held_out_XYZ(measured: Measurements, kind: ModelKind) -> Float64Array:
@@ -126,7 +126,7 @@ def held_out_errors(measured: Measurements, predicted: Float64Array) -> Float64A
         return np.zeros(0)
     truth = measured.XYZ[np.concatenate(folds(measured))]
     white = measured.white_XYZ
-    return delta_E_2000(XYZ_to_Lab(predicted, white), XYZ_to_Lab(truth, white))
+    return standards.dE00(predicted, truth, white)
 
 
 def _on_trial(measured: Measurements, kind: ModelKind) -> ModelResult:

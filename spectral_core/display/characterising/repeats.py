@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from spectral_core import standards
 from spectral_core.arrays import Float64Array, IntArray
 from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.display.characterising.verdicts import Verdict, untold
 from spectral_core.display.measuring.measurements import SAME_CODE, Measurements
-from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 # Of white's luminance: darker patches are read too coarsely for a trend.
 _BRIGHT = 0.01
@@ -34,7 +34,7 @@ def noise(measured: Measurements) -> float | None:
     if not repeated.any():
         return None
     means = np.stack([np.bincount(group, measured.XYZ[:, axis]) / count for axis in range(3)], axis=1)
-    return float(_dE00(measured.XYZ[repeated], means[group[repeated]], measured.white_XYZ).mean())
+    return float(standards.dE00(measured.XYZ[repeated], means[group[repeated]], measured.white_XYZ).mean())
 
 
 def reading_noise(measured: Measurements) -> tuple[float, float] | None:
@@ -91,7 +91,7 @@ def duplicates(measured: Measurements) -> Verdict:
     if not len(repeated):
         return untold(name, unit, _REPEAT)
     medians = np.stack([np.median(measured.XYZ[group == group[index]], axis=0) for index in repeated])
-    distance = _dE00(measured.XYZ[repeated], medians, measured.white_XYZ)
+    distance = standards.dE00(measured.XYZ[repeated], medians, measured.white_XYZ)
     usual = _OUTLYING * float(np.median(distance))
     limit, why = max((_OUTLYING_DE00, "half of what is just seen"), (usual, "6 times the median of all repeats"))
     outlying = repeated[distance > limit]
@@ -145,7 +145,3 @@ def _groups(codes: Float64Array) -> tuple[IntArray, IntArray]:
     keys = np.round(codes / SAME_CODE).astype(int)
     _, group, count = np.unique(keys, axis=0, return_inverse=True, return_counts=True)
     return np.asarray(group.ravel()), count
-
-
-def _dE00(a: Float64Array, b: Float64Array, white_XYZ: Float64Array) -> Float64Array:
-    return delta_E_2000(XYZ_to_Lab(a, white_XYZ), XYZ_to_Lab(b, white_XYZ))

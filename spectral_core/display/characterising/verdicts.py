@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from spectral_core import standards
 from spectral_core.arrays import BoolArray, Float64Array
 from spectral_core.display.characterising.noise import noisy
 from spectral_core.display.measuring.measurements import SAME_CODE, Measurements
 from spectral_core.display.models.fitting import channel_lut
 from spectral_core.display.models.tone_models import LutMatrix
-from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
 _NO_RAMPS = "measure ramps of each channel and of grey to learn of their shape"
 CHANNELS = ("red", "green", "blue")
@@ -157,7 +157,7 @@ def _sums(
 ) -> Verdict:
     predicted = summed.forward(mixed.codes)
     percent = 100 * np.abs((mixed.XYZ - predicted) / white_XYZ).max(axis=1)
-    dE00 = delta_E_2000(XYZ_to_Lab(predicted, white_XYZ), XYZ_to_Lab(mixed.XYZ, white_XYZ))
+    dE00 = standards.dE00(predicted, mixed.XYZ, white_XYZ)
     details = {
         "mean_percent": float(percent.mean()), "max_percent": float(percent.max()),
         "mean_dE00": float(dE00.mean()), "max_dE00": float(dE00.max()), "mixes": float(len(dE00)),
@@ -177,7 +177,7 @@ def _sums(
 def _noise_dE00(XYZ: Float64Array, noise: tuple[float, float], white_XYZ: Float64Array) -> float:
     """Mean dE00 that an instrument's noise alone gives these readings."""
     read = noisy(XYZ, noise, np.random.default_rng(0))
-    return float(delta_E_2000(XYZ_to_Lab(read, white_XYZ), XYZ_to_Lab(XYZ, white_XYZ)).mean())
+    return float(standards.dE00(read, XYZ, white_XYZ).mean())
 
 
 def _independence(

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +10,7 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
 from spectral_core.display.measuring.measurements import SAME_CODE, read_measurements
+from spectral_core.display.measuring.tables import CODES, COLOURS, parse_table, unit_codes
 from spectral_core.display.profile import DisplayProfile
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
@@ -138,64 +136,16 @@ def read_colours(path: Path, observer: str = DEFAULT_OBSERVER) -> Colours:
         If the file is none of these; the message names the line.
     """
     text = read_text(path, DisplayError, _REMEDY)
-    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
-    delimiter = max(",;\t", key=lines[0][1].count) if lines else ","
-    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO("\n".join(t for _, t in lines)),
-                                                                 delimiter=delimiter)]  # fmt: skip
-    header = rows[0] if rows else []
-    columns = next((names for names in (("X", "Y", "Z"), ("x", "y", "Y")) if set(names) <= set(header)), None)
-    if columns is None:
+    table = None if "BEGIN_DATA_FORMAT" in text else parse_table(text, path, _REMEDY)
+    columns = None if table is None else next((names for names in COLOURS if table.has(names)), None)
+    if table is None or columns is None:
         measured = read_measurements(path, observer)
         return Colours(measured.XYZ, measured.codes, unit=measured.unit)
-    if len(rows) != len(lines) or len(rows) < 2:
-        raise DisplayError("holds no colours", where=path, remedy=_REMEDY)
-    numbered = [(n, row) for (n, _), row in zip(lines[1:], rows[1:], strict=True)]
-    for number, row in numbered:
-        if len(row) != len(header):
-            raise DisplayError(
-                f"{len(row)} columns, the header has {len(header)}",
-                where=f"{path}, line {number}",
-                remedy="correct the row",
-            )
-    values = _columns(header, numbered, columns, path)
-    if columns[0] == "x":
-        values = _xyY_to_XYZ(values, numbered, path)
-    codes = _columns(header, numbered, ("R", "G", "B"), path) if {"R", "G", "B"} <= set(header) else None
-    if codes is not None:
-        codes = frozen(codes / (255.0 if codes.max() > 1 else 1.0))
-    named = header[0].casefold() in _NAMES
-    relative = abs(values[:, 1].max() - 100) < 1
-    return Colours(
-        frozen(values), codes, tuple(row[0] for _, row in numbered) if named else None, "relative" if relative else
-        "cd/m2",
-    )  # fmt: skip
-
-
-def _columns(
-    header: list[str], rows: list[tuple[int, list[str]]], names: tuple[str, ...], path: Path
-) -> Float64Array:  # fmt: skip
-    """The columns (n, len(names)) of a table."""
-    places = [header.index(name) for name in names]
-    return np.array([[_number(row[place], path, number) for place in places] for number, row in rows])
-
-
-def _number(cell: str, path: Path, line: int) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise DisplayError(f"'{cell}' is no finite number", where=f"{path}, line {line}", remedy="correct the cell")
-    return value
-
-
-def _xyY_to_XYZ(xyY: Float64Array, rows: list[tuple[int, list[str]]], path: Path) -> Float64Array:
-    x, y, Y = xyY.T
-    for (number, _), bad in zip(rows, (y <= 0) & (Y != 0), strict=True):
-        if bad:
-            raise DisplayError("y is not above 0", where=f"{path}, line {number}", remedy="correct the reading")
-    safe = np.where(y > 0, y, 1.0)
-    return np.stack([x / safe * Y, Y, (1 - x - y) / safe * Y], axis=1)
+    XYZ = table.XYZ(columns, table.numbers(columns))
+    codes = frozen(unit_codes(table.numbers(CODES))) if table.has(CODES) else None
+    names = tuple(row[0] for row in table.rows) if table.header[0].casefold() in _NAMES else None
+    relative = abs(XYZ[:, 1].max() - 100) < 1
+    return Colours(frozen(XYZ), codes, names, "relative" if relative else "cd/m2")
 
 
 def _partners(predicted: Colours, measured: Colours) -> IntArray:

@@ -7,9 +7,6 @@ fitted to best (the simplest within the standard error of the best).
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -17,11 +14,11 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
 from spectral_core.chromaticities import XYZ_to_uv
+from spectral_core.display.measuring.tables import CODES, COLOURS, Table, read_table, unit_codes
 from spectral_core.errors import DisplayError
-from spectral_core.files import read_text
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
-_HEADERS = (["Y"], ["x", "y", "Y"], ["R", "G", "B", "X", "Y", "Z"])
+_HEADERS = (("Y",), COLOURS[1], (*CODES, *COLOURS[0]))
 _WIDEST_FIELD = 180.0
 # The centre is where a reading was meant to be at 0, 0, give or take the aiming.
 _CENTRE_DEG, _FARTHEST_CENTRE_DEG = 0.5, 2.5
@@ -140,56 +137,31 @@ def read_field(path: Path) -> tuple[FieldReadings, ...]:
     DisplayError
         If the file is no such table, a reading cannot be, or white was not read.
     """
-    text = read_text(path, DisplayError, "give a CSV of readings over the field")
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    if len(lines) < 3:
-        raise DisplayError("holds fewer than two readings", where=path, remedy="give a header and one row a point")
-    delimiter = max(",;\t", key=lines[0][1].count)
-    try:
-        rows = [next(csv.reader(io.StringIO(line), delimiter=delimiter)) for _, line in lines]
-    except csv.Error as error:
-        raise DisplayError(str(error), where=path, remedy="is it a CSV?") from None
-    header = [cell.strip() for cell in rows[0]]
-    if header[:2] != ["x_deg", "y_deg"] or header[2:] not in _HEADERS:
+    table = read_table(path, "give a CSV of readings over the field: a header and a row a point, two or more", least=2)
+    columns = table.header[2:]
+    if table.header[:2] != ("x_deg", "y_deg") or columns not in _HEADERS:
         raise DisplayError(
-            f"the header is {','.join(header)[:80]}",
+            f"the header is {','.join(table.header)[:80]}",
             where=path,
             remedy="give x_deg,y_deg, then Y, or x,y,Y, or R,G,B,X,Y,Z",
         )
-    table = np.array(
-        [_numbers(row, len(header), path, number) for (number, _), row in zip(lines[1:], rows[1:], strict=True)]
-    )
-    if np.abs(table[:, :2]).max() > _WIDEST_FIELD:
+    values = table.numbers(table.header)
+    if np.abs(values[:, :2]).max() > _WIDEST_FIELD:
         raise DisplayError(f"angles beyond {_WIDEST_FIELD:g} degrees", where=path, remedy="give degrees")
-    return _patches(header[2:], table, path)
+    return _patches(table, values)
 
 
-def _numbers(row: list[str], width: int, path: Path, number: int) -> list[float]:
-    where = f"{path}, line {number}"
-    if len(row) != width:
-        raise DisplayError(f"{len(row)} columns, the header has {width}", where=where, remedy="correct the row")
-    try:
-        values = [float(cell) for cell in row]
-    except ValueError:
-        values = [math.nan]
-    if not all(math.isfinite(value) and abs(value) < 1e12 for value in values):
-        raise DisplayError("holds something that is no finite number", where=where, remedy="correct the row")
-    return values
-
-
-def _patches(columns: list[str], table: Float64Array, path: Path) -> tuple[FieldReadings, ...]:
-    points, values = table[:, :2], table[:, 2:]
-    codes = np.ones((len(table), 3))
-    if columns == ["Y"]:
+def _patches(table: Table, values: Float64Array) -> tuple[FieldReadings, ...]:
+    path, columns = table.path, table.header[2:]
+    points, values = values[:, :2], values[:, 2:]
+    codes = np.ones((len(values), 3))
+    if columns == ("Y",):
         XYZ, Y = None, values[:, 0]
-    elif columns == ["x", "y", "Y"]:
-        x, y, Y = values.T
-        if not (y > 0).all():
-            raise DisplayError("a chromaticity y is not above 0", where=path, remedy="correct the reading")
-        XYZ = np.stack([x / y * Y, Y, (1 - x - y) / y * Y], axis=1)
     else:
-        codes = values[:, :3] / (255.0 if values[:, :3].max() > 1 else 1.0)
-        XYZ, Y = values[:, 3:], values[:, 4]
+        if columns[:3] == CODES:
+            codes = unit_codes(values[:, :3])
+        XYZ = table.XYZ(columns[-3:], values[:, -3:])
+        Y = XYZ[:, 1]
     if not (Y > 0).all() or (XYZ is not None and not (XYZ.sum(axis=1) > 0).all()):
         raise DisplayError("a luminance is not above 0", where=path, remedy="correct or leave out the reading")
     keys, group = np.unique(codes.round(4), axis=0, return_inverse=True)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from spectral_core import weights
+from spectral_core import standards, weights
 from spectral_core.arrays import Float64Array
 from spectral_core.errors import DisplayError
-from spectral_core.standards import DEFAULT_OBSERVER, XYZ_to_Lab, delta_E_2000
+from spectral_core.standards import DEFAULT_OBSERVER
 
 _WAVELENGTH = re.compile(r"(?:SPEC_)?(\d+(?:\.\d+)?)\s*(?:nm)?", re.IGNORECASE)
 _FEWEST_BANDS = 3
@@ -81,6 +81,6 @@ def emission(names: Sequence[str], columns: Sequence[Float64Array], path: Path) 
 def agreement(XYZ: Float64Array, spectral: Float64Array, white: int) -> Agreement:
     """Compare the instrument's XYZ (n, 3) with the spectra's (n, 3), scaled to agree in Y of patch `white`."""
     scaled = spectral * (XYZ[white, 1] / spectral[white, 1])
-    dE00 = delta_E_2000(XYZ_to_Lab(scaled, XYZ[white]), XYZ_to_Lab(XYZ, XYZ[white]))
+    dE00 = standards.dE00(scaled, XYZ, XYZ[white])
     percent = 100 * float(np.abs(scaled - XYZ).max() / XYZ[white, 1])
     return Agreement(float(dE00.mean()), float(dE00.max()), percent)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +13,7 @@ from spectral_core.display.measuring.cgats import parse_cgats
 from spectral_core.display.measuring.contradictions import refuse_contradictions
 from spectral_core.display.measuring.emission import Agreement, Emission, agreement, emission, wavelength
 from spectral_core.display.measuring.state import iso_date
+from spectral_core.display.measuring.tables import CODES, COLOURS, Table, parse_table, unit_codes
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
 from spectral_core.standards import DEFAULT_OBSERVER
@@ -23,6 +22,7 @@ _NAMED_CODES = {
     "red": (1.0, 0.0, 0.0), "green": (0.0, 1.0, 0.0), "blue": (0.0, 0.0, 1.0),
     "white": (1.0, 1.0, 1.0), "black": (0.0, 0.0, 0.0),
 }  # fmt: skip
+_REMEDY = "give a .ti3 or a CSV of measurements: a header and one row a patch"
 _LUMINANCE_HEADERS = ("l", "y_relative", "lv", "luminance", "luminance_cd_m2", "y_cd_m2")
 # Codes of the same patch may differ by the rounding of their file, less than a quarter of an 8-bit level.
 SAME_CODE = 1e-3
@@ -112,8 +112,9 @@ def read_measurements(path: str | Path, observer: str = DEFAULT_OBSERVER) -> Mea
         spectra that an observer other than the default needs.
     """
     path = Path(path)
-    text = read_text(path, DisplayError, "give a .ti3 or CSV of measurements")
-    measured, spectra = _from_cgats(text, path) if "BEGIN_DATA_FORMAT" in text else _from_csv(text, path)
+    text = read_text(path, DisplayError, _REMEDY)
+    is_cgats = "BEGIN_DATA_FORMAT" in text
+    measured, spectra = _from_cgats(text, path) if is_cgats else _from_csv(parse_table(text, path, _REMEDY))
     if spectra is not None:
         measured = _with_spectra(measured, spectra, observer, path)
     elif observer != DEFAULT_OBSERVER:
@@ -176,91 +177,55 @@ def _stated_luminance(text: str) -> float | None:
     return luminance if 0 < luminance < math.inf else None
 
 
-def _from_csv(text: str, path: Path) -> tuple[Measurements, Emission | None]:
-    lines = [
-        (number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
-    ]
-    if len(lines) < 2:
-        raise DisplayError("holds no measurements", where=path, remedy="give a header and one row a patch")
-    delimiter = max(",;\t", key=lines[0][1].count)
-    rows = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), delimiter=delimiter))
-    header = [cell.strip() for cell in rows[0]]
-    body = [(number, [cell.strip() for cell in row]) for (number, _), row in zip(lines[1:], rows[1:], strict=True)]
-    for number, row in body:
-        if len(row) != len(header):
-            raise DisplayError(
-                f"{len(row)} columns, the header has {len(header)}",
-                where=f"{path}, line {number}",
-                remedy="correct the row",
-            )
-    if header[0].casefold() in ("color", "colour", "channel", "name", "patch"):
-        return _named_rows(header, body, path), None
-    return _code_rows(header, body, path)
+def _from_csv(table: Table) -> tuple[Measurements, Emission | None]:
+    if table.header[0].casefold() in ("color", "colour", "channel", "name", "patch"):
+        return _named_rows(table), None
+    return _code_rows(table)
 
 
-def _code_rows(
-    header: list[str], body: list[tuple[int, list[str]]], path: Path
-) -> tuple[Measurements, Emission | None]:
+def _code_rows(table: Table) -> tuple[Measurements, Emission | None]:
     """Rows of codes with X, Y, Z or x, y, Y or a spectrum; the other columns do not count."""
-    colour = header[3:6] if header[3:6] in (["X", "Y", "Z"], ["x", "y", "Y"]) else []
+    header = table.header
+    colour = header[3:6] if header[3:6] in COLOURS else ()
     bands = [index for index in range(3 + len(colour), len(header)) if wavelength(header[index]) is not None]
-    used = [*range(3 + len(colour)), *bands]
-    usable = header[:3] == ["R", "G", "B"]
-    table = np.array([[_value(row[index], path, number) for index in used] for number, row in body if usable])
-    spectra = emission([header[index] for index in bands], list(table.T[3 + len(colour) :]), path) if usable else None
+    usable = header[:3] == CODES
+    values = table.numbers_at([*range(3 + len(colour)), *bands]) if usable else np.zeros((0, 0))
+    spectra = (
+        emission([header[index] for index in bands], list(values.T[3 + len(colour) :]), table.path) if usable else None
+    )
     if not usable or not (colour or spectra):
         raise DisplayError(
             f"the header is {','.join(header[:6])}",
-            where=path,
+            where=table.path,
             remedy="give R,G,B,X,Y,Z or R,G,B,x,y,Y or R,G,B,380,385,..., or named rows with L,x,y",
         )
-    codes = table[:, :3] / (255.0 if table[:, :3].max() > 1 else 1.0)
-    XYZ = table[:, 3:6] if colour else np.zeros((0, 3))
-    XYZ = _xyY_to_XYZ(XYZ, path) if colour[:1] == ["x"] else XYZ
+    XYZ = table.XYZ(colour, values[:, 3:6]) if colour else np.zeros((0, 3))
     relative = not colour or abs(XYZ[:, 1].max() - 100) < 1
-    return Measurements(frozen(codes), frozen(XYZ), "relative" if relative else "cd/m2"), spectra
+    return Measurements(frozen(unit_codes(values[:, :3])), frozen(XYZ), "relative" if relative else "cd/m2"), spectra
 
 
-def _named_rows(header: list[str], body: list[tuple[int, list[str]]], path: Path) -> Measurements:
+def _named_rows(table: Table) -> Measurements:
     """Rows Red, Green, Blue, White, perhaps Black, with luminance, x and y."""
-    keys = [name.casefold() for name in header]
+    header, keys = table.header, [name.casefold() for name in table.header]
     luminance = next((keys.index(each) for each in _LUMINANCE_HEADERS if each in keys), None)
     if luminance is None and "Y" in header:
         luminance = header.index("Y")
     if luminance is None or "x" not in keys or "y" not in keys:
         raise DisplayError(
-            f"the header is {','.join(header)}", where=path, remedy="give a name, the luminance, x and y"
+            f"the header is {','.join(header)}", where=table.path, remedy="give a name, the luminance, x and y"
         )
     columns = (
         header.index("x") if "x" in header else keys.index("x"),
         header.index("y") if "y" in header else keys.index("y"),
     )
-    codes, xyY = [], []
-    for number, row in body:
+    codes = []
+    for number, row in enumerate(table.rows):
         name = row[0].casefold()
         if name not in _NAMED_CODES:
             raise DisplayError(
-                f"'{row[0]}' is no known patch", where=f"{path}, line {number}", remedy=f"use {', '.join(_NAMED_CODES)}"
+                f"'{row[0]}' is no known patch", where=table.where(number), remedy=f"use {', '.join(_NAMED_CODES)}"
             )
         codes.append(_NAMED_CODES[name])
-        xyY.append([_value(row[index], path, number) for index in (*columns, luminance)])
+    XYZ = table.XYZ(COLOURS[1], table.numbers_at((*columns, luminance)))
     relative = keys[luminance] == "y_relative"
-    return Measurements(frozen(codes), frozen(_xyY_to_XYZ(np.array(xyY), path)), "relative" if relative else "cd/m2")
-
-
-def _xyY_to_XYZ(xyY: Float64Array, path: Path) -> Float64Array:
-    x, y, Y = xyY.T
-    if not ((y > 0) | (Y == 0)).all() or (Y < 0).any():
-        raise DisplayError("a chromaticity y or a luminance is not above 0", where=path, remedy="correct the reading")
-    safe = np.where(y > 0, y, 1.0)
-    return np.stack([x / safe * Y, Y, (1 - x - y) / safe * Y], axis=1)
-
-
-def _value(cell: str, path: Path, number: int) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise DisplayError(f"'{cell}' is no finite number", where=f"{path}, line {number}", remedy="correct the cell")
-    return value
+    return Measurements(frozen(codes), frozen(XYZ), "relative" if relative else "cd/m2")

@@ -1,4 +1,4 @@
-"""Sets of patches: the published protocol, and smaller ones that put each reading where it says most."""
+"""Sets of patches that put each reading where it says most."""
 
 from __future__ import annotations
 
@@ -11,12 +11,9 @@ from spectral_core.display.measuring.measurements import SAME_CODE
 from spectral_core.standards import XYZ_to_Lab
 
 SMALLEST = 18
-PUBLISHED = 234
 _LARGEST_CODE = 255
 # Black, white and the primaries: without them there is no profile.
 _ANCHORS = np.array([[0, 0, 0], [1, 1, 1], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
-_STEP = 5
-_PUBLISHED_MIXES = 50
 # Mixes that a smooth correction needs; a set that cannot have them gets channel ramps instead, which
 # on a power-limited headset halve the error of 30 patches without a correction (dE00 1.5 against 2.9).
 _CORRECTED_MIXES, _FEWEST_MIXES = 20, 10
@@ -29,18 +26,6 @@ _READING_VARIANCE = 1e-2
 _CANDIDATES = 1000
 _SEED = 20
 Colours = Callable[[Float64Array], Float64Array]
-
-
-def published_protocol(colours: Colours) -> Float64Array:
-    """234 codes (n, 3): channel ramps 0..255 in steps of 5, greys, 50 mixes (Diaz-Barrancas et al. 2020).
-
-    The mixes, at random there, are placed as in `starting_set`.
-    """
-    steps = np.arange(_STEP, _LARGEST_CODE, _STEP) / _LARGEST_CODE
-    ramps = np.concatenate([_ANCHORS, *(axis * steps[:, None] for axis in np.eye(3))])
-    greys = _grey(_levels(PUBLISHED - len(ramps) - _PUBLISHED_MIXES))
-    fixed = np.concatenate([ramps, greys])
-    return np.concatenate([fixed, best_mixes(fixed, PUBLISHED - len(fixed), colours)])
 
 
 def starting_set(count: int, colours: Colours) -> Float64Array:

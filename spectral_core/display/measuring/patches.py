@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import datetime
-import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,14 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
+from spectral_core.display.measuring.tables import CODES, COLOURS, read_table, unit_codes
 from spectral_core.errors import DisplayError
-from spectral_core.files import atomic_path, read_text
+from spectral_core.files import atomic_path
 
 PUBLISHED = "published"
-_CODES = ["R", "G", "B"]
 _NAMES = ("name", "patch", "colour", "color")
-SHOWN_HEADER = [*_CODES, "index", "name", "shown", "ready", "gone"]
-_COLOURS = (["X", "Y", "Z"], ["x", "y", "Y"])
+SHOWN_HEADER = [*CODES, "index", "name", "shown", "ready", "gone"]
 # The 50 colours of the published protocol are random; a fixed seed gives everyone the same.
 _SEED = 2021
 
@@ -74,22 +72,21 @@ def read_patches(source: str | Path) -> PatchList:
     if str(source) == PUBLISHED:
         return published_patches()
     path = Path(source)
-    header, rows = _table(path, "give a CSV with the header R,G,B, or 'published'")
-    _require(header, _CODES, path)
-    codes = _columns(header, rows, _CODES, path)
-    codes = codes / (255.0 if codes.max() > 1 else 1.0)
-    for (number, _), code in zip(rows, codes, strict=True):
+    table = read_table(path, "give a CSV with the header R,G,B, or 'published'")
+    table.require(CODES)
+    codes = unit_codes(table.numbers(CODES))
+    for row, code in enumerate(codes):
         if not ((code >= 0) & (code <= 1)).all():
             raise DisplayError(
-                "device codes outside 0..1 (or 0..255)", where=f"{path}, line {number}", remedy="correct the row"
+                "device codes outside 0..1 (or 0..255)", where=table.where(row), remedy="correct the row"
             )
-    name = next((index for index, each in enumerate(header) if each.casefold() in _NAMES), None)
-    return PatchList(frozen(codes), tuple("" if name is None else row[name] for _, row in rows))
+    name = next((index for index, each in enumerate(table.header) if each.casefold() in _NAMES), None)
+    return PatchList(frozen(codes), tuple("" if name is None else row[name] for row in table.rows))
 
 
 def write_patches(patches: PatchList, path: str | Path) -> None:
     """The list as CSV ``R,G,B,name``, codes 0..1, for `read_patches`."""
-    _write([*_CODES, "name"], ([*codes_text(code), name] for code, name in _each(patches)), path)
+    _write([*CODES, "name"], ([*codes_text(code), name] for code, name in _each(patches)), path)
 
 
 def codes_text(codes: Float64Array) -> list[str]:
@@ -132,28 +129,29 @@ def pair(shown: str | Path, readings: str | Path) -> Paired:
     """
     shown, readings = Path(shown), Path(readings)
     showings = _settled(shown)
-    header, rows = _table(readings, "give a CSV of readings with X,Y,Z or x,y,Y")
-    colour = next((each for each in _COLOURS if set(each) <= set(header)), None)
+    table = read_table(readings, "give a CSV of readings with X,Y,Z or x,y,Y")
+    header, rows = table.header, table.rows
+    colour = next((each for each in COLOURS if table.has(each)), None)
     if colour is None:
         raise DisplayError(
             f"the header is {','.join(header[:6])}", where=readings, remedy="give the columns X,Y,Z or x,y,Y"
         )
-    _columns(header, rows, colour, readings)  # a cell that is no number is told with its line
+    table.numbers(colour)  # a cell that is no number is told with its line
     matched_by = next((each for each in ("index", "time") if each in header), "order")
     if matched_by == "order":
         found = _by_order(showings, len(rows), shown, readings)
     else:
         column = header.index(matched_by)
         find = _by_index if matched_by == "index" else _by_time
-        found = [find(showings, row[column], f"{readings}, line {number}") for number, row in rows]
-    others = [each for each in header if each not in (*colour, "index", "time", *_CODES, "name")]
+        found = [find(showings, row[column], table.where(number)) for number, row in enumerate(rows)]
+    others = [each for each in header if each not in (*colour, "index", "time", *CODES, "name")]
     picked = [header.index(each) for each in (*colour, *others)]
-    table = tuple(
-        (*showing.codes, *(row[index] for index in picked)) for showing, (_, row) in zip(found, rows, strict=True)
+    paired = tuple(
+        (*showing.codes, *(row[index] for index in picked)) for showing, row in zip(found, rows, strict=True)
     )
     missing = len({each.index for each in showings} - {each.index for each in found})
     warnings = (f"{missing} of the patches shown have no reading",) if missing else ()
-    return Paired((*_CODES, *colour, *others), table, matched_by, warnings)
+    return Paired((*CODES, *colour, *others), paired, matched_by, warnings)
 
 
 def write_paired(paired: Paired, path: str | Path) -> None:
@@ -171,13 +169,13 @@ class _Shown:
 
 def _settled(path: Path) -> list[_Shown]:
     """What the player showed long enough, in order."""
-    header, rows = _table(path, "give the patches-shown.csv that the player wrote")
-    _require(header, SHOWN_HEADER, path)
-    _columns(header, rows, _CODES, path)
-    at = {name: header.index(name) for name in SHOWN_HEADER}
+    table = read_table(path, "give the patches-shown.csv that the player wrote")
+    table.require(SHOWN_HEADER)
+    table.numbers(CODES)
+    at = {name: table.header.index(name) for name in SHOWN_HEADER}
     found = []
-    for number, row in rows:
-        where = f"{path}, line {number}"
+    for number, row in enumerate(table.rows):
+        where = table.where(number)
         if row[at["ready"]]:
             codes = (row[at["R"]], row[at["G"]], row[at["B"]])
             times = (_seconds(row[at[name]], where) for name in ("ready", "gone"))
@@ -231,56 +229,6 @@ def _seconds(cell: str, where: str) -> float:
     if not math.isfinite(seconds):
         raise DisplayError(f"'{cell}' is no time", where=where, remedy="give ISO 8601 or seconds since 1970")
     return seconds
-
-
-def _table(path: Path, remedy: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """Header and rows with their line numbers; all rows as long as the header."""
-    text = read_text(path, DisplayError, remedy)
-    lines = [
-        (number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
-    ]
-    if len(lines) < 2:
-        raise DisplayError("holds no rows", where=path, remedy=remedy)
-    delimiter = max(",;\t", key=lines[0][1].count)
-    try:
-        cells = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), delimiter=delimiter))
-    except csv.Error as error:
-        raise DisplayError(f"is no CSV ({error})", where=path, remedy=remedy) from None
-    header = [cell.strip() for cell in cells[0]]
-    rows = [(number, [cell.strip() for cell in row]) for (number, _), row in zip(lines[1:], cells[1:], strict=False)]
-    wrong = next((number for number, row in rows if len(row) != len(header)), None)
-    if wrong is not None or len(cells) != len(lines):
-        raise DisplayError(
-            f"not as many columns as the header ({len(header)})",
-            where=path if wrong is None else f"{path}, line {wrong}",
-            remedy="correct the row",
-        )
-    return header, rows
-
-
-def _require(header: Sequence[str], names: Sequence[str], path: Path) -> None:
-    missing = [each for each in names if each not in header]
-    if missing:
-        raise DisplayError(f"lacks the column {missing[0]}", where=path, remedy=f"the header is {','.join(names)}")
-
-
-def _columns(
-    header: Sequence[str], rows: Sequence[tuple[int, list[str]]], names: Sequence[str], path: Path
-) -> Float64Array:
-    """Finite numbers (n, len(names)) of the named columns."""
-    at = [header.index(each) for each in names]
-    values = np.empty((len(rows), len(names)))
-    for row, (number, cells) in enumerate(rows):
-        for column, index in enumerate(at):
-            try:
-                values[row, column] = float(cells[index])
-            except ValueError:
-                values[row, column] = math.nan
-            if not math.isfinite(values[row, column]):
-                raise DisplayError(
-                    f"'{cells[index]}' is no finite number", where=f"{path}, line {number}", remedy="correct the cell"
-                )
-    return values
 
 
 def _each(patches: PatchList) -> Iterable[tuple[Float64Array, str]]:
