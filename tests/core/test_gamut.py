@@ -87,10 +87,12 @@ def test_corrected_models_give_codes_too(name: str) -> None:
 @settings(max_examples=30, deadline=None)
 @given(code=codes)
 def test_colours_in_gamut_stay(name: str, rule: str, code: list[float]) -> None:
-    """To 1e-9 of white; codes of near-black channels amplify rounding, light does not."""
+    """To 1e-8 of white: sRGB's two pieces miss each other by 2e-9 where they meet (IEC 61966-2-1's rounded
+    numbers); codes of near-black channels amplify rounding, light does not.
+    """
     XYZ = model(name).forward(np.array(code))
     found, counts = map_to_gamut(model(name), XYZ, rule)  # type: ignore[arg-type]
-    np.testing.assert_allclose(model(name).forward(found), XYZ, atol=1e-9)
+    np.testing.assert_allclose(model(name).forward(found), XYZ, atol=1e-8)
     assert counts.outside == 0
 
 
