@@ -8,6 +8,7 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.display.measurements import Measurements
+from spectral_core.display.models import LEAST_LIGHT
 from spectral_core.display.repeats import clipping, drift, duplicates, instrument_noise, noise, reading_noise
 from spectral_core.display.verdicts import (
     ADDITIVE_PERCENT,
@@ -97,7 +98,11 @@ def _black(measured: Measurements, share: float) -> Verdict:
         return untold(name, unit, "measure black (codes 0): without it black is taken as 0")
     percent = 100 * share
     passed = percent <= _BLACK_PERCENT
-    found = f"black is {percent:.2g} % of white, a contrast of {1 / share:.0f}:1" if share > 0 else "black reads 0"
+    found = (
+        f"black is {percent:.2g} % of white, a contrast of {1 / share:.0f}:1"
+        if share > LEAST_LIGHT
+        else "black reads 0"
+    )
     advice = found if passed else f"{found}: keep stray light out, and let nothing lift the codes"
     details = {"black_Y": float(measured.black_XYZ[1])}
     return Verdict(name, percent, unit, _BLACK_PERCENT, "a contrast of 100:1", passed, advice, details)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from collections import defaultdict
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
-from spectral_core.display.measurements import SAME_CODE, read_measurements
+from spectral_core.display.measurements import SAME_CODE, is_about_100, read_measurements
 from spectral_core.display.profile import DisplayProfile
+from spectral_core.display.tables import Rows, number_columns, parse_table
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
 from spectral_core.standards import DEFAULT_OBSERVER, XYZ_to_Lab, delta_E_2000
@@ -21,6 +19,8 @@ from spectral_core.standards import DEFAULT_OBSERVER, XYZ_to_Lab, delta_E_2000
 _NAMES = ("name", "patch", "sample", "sample_name", "colour", "color", "dot")
 # The hue of what has less chroma than this is noise.
 _LEAST_CHROMA = 1.0
+# A colour beyond this many times the white of L*a*b* is in another unit: dE00 would tell nothing.
+_MOST_WHITES = 1e6
 # Sets whose luminances differ by more than this factor are in different units.
 _SAME_UNIT = 2.0
 _REMEDY = "give a CSV with X,Y,Z or x,y,Y (R,G,B and a name are optional) or a .ti3"
@@ -81,6 +81,11 @@ def compare(predicted: Colours, measured: Colours, white_XYZ: Float64Array) -> C
     """
     partner = _partners(predicted, measured)
     predicted_XYZ, measured_XYZ = predicted.XYZ[partner], measured.XYZ
+    if max(np.abs(predicted_XYZ).max(), np.abs(measured_XYZ).max()) > _MOST_WHITES * white_XYZ.min():
+        raise DisplayError(
+            f"a colour is more than {_MOST_WHITES:g} times the white {white_XYZ.tolist()}",
+            remedy="correct it, or give --white in the unit of the colours",
+        )
     Lab = [XYZ_to_Lab(XYZ, white_XYZ) for XYZ in (predicted_XYZ, measured_XYZ)]
     chroma = [np.hypot(each[:, 1], each[:, 2]) for each in Lab]
     hue = [np.degrees(np.arctan2(each[:, 2], each[:, 1])) for each in Lab]
@@ -110,6 +115,8 @@ def predict(measured: Colours, display: DisplayProfile) -> tuple[Colours, bool]:
     """
     if measured.codes is None:
         raise DisplayError("the readings have no codes", remedy="give R,G,B beside their colours")
+    if ((measured.codes < 0) | (measured.codes > 1)).any():
+        raise DisplayError("device codes outside 0..1 (or 0..255)", remedy="state codes 0..1 or 0..255")
     XYZ = display.to_XYZ(measured.codes)
     absolute = measured.unit == "cd/m2" and display.white_Y != 1.0
     white = measured.white_XYZ()
@@ -138,58 +145,37 @@ def read_colours(path: Path, observer: str = DEFAULT_OBSERVER) -> Colours:
         If the file is none of these; the message names the line.
     """
     text = read_text(path, DisplayError, _REMEDY)
-    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
-    delimiter = max(",;\t", key=lines[0][1].count) if lines else ","
-    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO("\n".join(t for _, t in lines)),
-                                                                 delimiter=delimiter)]  # fmt: skip
-    header = rows[0] if rows else []
+    if "BEGIN_DATA_FORMAT" in text:
+        return _measured(path, observer)
+    header, rows = parse_table(text, path, _REMEDY)
     columns = next((names for names in (("X", "Y", "Z"), ("x", "y", "Y")) if set(names) <= set(header)), None)
     if columns is None:
-        measured = read_measurements(path, observer)
-        return Colours(measured.XYZ, measured.codes, unit=measured.unit)
-    if len(rows) != len(lines) or len(rows) < 2:
-        raise DisplayError("holds no colours", where=path, remedy=_REMEDY)
-    numbered = [(n, row) for (n, _), row in zip(lines[1:], rows[1:], strict=True)]
-    for number, row in numbered:
-        if len(row) != len(header):
-            raise DisplayError(
-                f"{len(row)} columns, the header has {len(header)}",
-                where=f"{path}, line {number}",
-                remedy="correct the row",
-            )
-    values = _columns(header, numbered, columns, path)
+        return _measured(path, observer)
+    values = _columns(header, rows, columns, path)
     if columns[0] == "x":
-        values = _xyY_to_XYZ(values, numbered, path)
-    codes = _columns(header, numbered, ("R", "G", "B"), path) if {"R", "G", "B"} <= set(header) else None
+        values = _xyY_to_XYZ(values, rows, path)
+    codes = _columns(header, rows, ("R", "G", "B"), path) if {"R", "G", "B"} <= set(header) else None
     if codes is not None:
         codes = frozen(codes / (255.0 if codes.max() > 1 else 1.0))
     named = header[0].casefold() in _NAMES
-    relative = abs(values[:, 1].max() - 100) < 1
+    relative = is_about_100(values)
     return Colours(
-        frozen(values), codes, tuple(row[0] for _, row in numbered) if named else None, "relative" if relative else
+        frozen(values), codes, tuple(row[0] for _, row in rows) if named else None, "relative" if relative else
         "cd/m2",
     )  # fmt: skip
 
 
-def _columns(
-    header: list[str], rows: list[tuple[int, list[str]]], names: tuple[str, ...], path: Path
-) -> Float64Array:  # fmt: skip
+def _measured(path: Path, observer: str) -> Colours:
+    measured = read_measurements(path, observer)
+    return Colours(measured.XYZ, measured.codes, unit=measured.unit)
+
+
+def _columns(header: list[str], rows: Rows, names: tuple[str, ...], path: Path) -> Float64Array:
     """The columns (n, len(names)) of a table."""
-    places = [header.index(name) for name in names]
-    return np.array([[_number(row[place], path, number) for place in places] for number, row in rows])
+    return number_columns(rows, [header.index(name) for name in names], path)
 
 
-def _number(cell: str, path: Path, line: int) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise DisplayError(f"'{cell}' is no finite number", where=f"{path}, line {line}", remedy="correct the cell")
-    return value
-
-
-def _xyY_to_XYZ(xyY: Float64Array, rows: list[tuple[int, list[str]]], path: Path) -> Float64Array:
+def _xyY_to_XYZ(xyY: Float64Array, rows: Rows, path: Path) -> Float64Array:
     x, y, Y = xyY.T
     for (number, _), bad in zip(rows, (y <= 0) & (Y != 0), strict=True):
         if bad:

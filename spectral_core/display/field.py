@@ -7,9 +7,6 @@ fitted to best (the simplest within the standard error of the best).
 
 from __future__ import annotations
 
-import csv
-import io
-import math
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -17,6 +14,7 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
 from spectral_core.display.chromaticities import uv
+from spectral_core.display.tables import number_columns, parse_table
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
@@ -141,40 +139,17 @@ def read_field(path: Path) -> tuple[FieldReadings, ...]:
         If the file is no such table, a reading cannot be, or white was not read.
     """
     text = read_text(path, DisplayError, "give a CSV of readings over the field")
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and line[0] != "#"]
-    if len(lines) < 3:
-        raise DisplayError("holds fewer than two readings", where=path, remedy="give a header and one row a point")
-    delimiter = max(",;\t", key=lines[0][1].count)
-    try:
-        rows = [next(csv.reader(io.StringIO(line), delimiter=delimiter)) for _, line in lines]
-    except csv.Error as error:
-        raise DisplayError(str(error), where=path, remedy="is it a CSV?") from None
-    header = [cell.strip() for cell in rows[0]]
+    header, rows = parse_table(text, path, "give a header and one row a point")
     if header[:2] != ["x_deg", "y_deg"] or header[2:] not in _HEADERS:
         raise DisplayError(
             f"the header is {','.join(header)[:80]}",
             where=path,
             remedy="give x_deg,y_deg, then Y, or x,y,Y, or R,G,B,X,Y,Z",
         )
-    table = np.array(
-        [_numbers(row, len(header), path, number) for (number, _), row in zip(lines[1:], rows[1:], strict=True)]
-    )
+    table = number_columns(rows, list(range(len(header))), path)
     if np.abs(table[:, :2]).max() > _WIDEST_FIELD:
         raise DisplayError(f"angles beyond {_WIDEST_FIELD:g} degrees", where=path, remedy="give degrees")
     return _patches(header[2:], table, path)
-
-
-def _numbers(row: list[str], width: int, path: Path, number: int) -> list[float]:
-    where = f"{path}, line {number}"
-    if len(row) != width:
-        raise DisplayError(f"{len(row)} columns, the header has {width}", where=where, remedy="correct the row")
-    try:
-        values = [float(cell) for cell in row]
-    except ValueError:
-        values = [math.nan]
-    if not all(math.isfinite(value) and abs(value) < 1e12 for value in values):
-        raise DisplayError("holds something that is no finite number", where=where, remedy="correct the row")
-    return values
 
 
 def _patches(columns: list[str], table: Float64Array, path: Path) -> tuple[FieldReadings, ...]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +13,7 @@ from spectral_core.display.cgats import parse_cgats
 from spectral_core.display.contradictions import refuse_contradictions
 from spectral_core.display.emission import Agreement, Emission, agreement, emission, wavelength
 from spectral_core.display.state import iso_date
+from spectral_core.display.tables import Rows, finite_number, number_columns, parse_table
 from spectral_core.errors import DisplayError
 from spectral_core.files import read_text
 from spectral_core.standards import DEFAULT_OBSERVER
@@ -155,16 +154,28 @@ def _from_cgats(text: str, path: Path) -> tuple[Measurements, Emission | None]:
     spectra = emission(names, [table.columns[name] for name in names], path)
     if codes is None or (XYZ is None and spectra is None):
         raise DisplayError("lacks RGB_R... or XYZ_X... columns", where=path, remedy="give a .ti3 of a display")
-    relative = table.keywords.get("NORMALIZED_TO_Y_100", "NO").upper() == "YES"
+    # Spectra alone are scaled to a white of 100, whatever the file says of XYZ that it has not.
+    relative = XYZ is None or _is_normalised(table.keywords.get("NORMALIZED_TO_Y_100", "").upper(), XYZ)
+    stated = _stated_luminance(table.keywords.get("LUMINANCE_XYZ_CDM2", ""))
     measured = Measurements(
         frozen(codes / 100),
         frozen(np.zeros((0, 3)) if XYZ is None else XYZ),
         "relative" if relative else "cd/m2",
         table.keywords.get("TARGET_INSTRUMENT", ""),
         date=iso_date(table.keywords.get("CREATED", "")),
-        white_luminance_cd_m2=_stated_luminance(table.keywords.get("LUMINANCE_XYZ_CDM2", "")) if relative else None,
+        white_luminance_cd_m2=stated if relative else None,
     )
     return measured, spectra
+
+
+def _is_normalised(keyword: str, XYZ: Float64Array) -> bool:
+    """Whether XYZ (n, 3) of a ``.ti3`` are relative; a file that does not say it is judged as a CSV is."""
+    return keyword == "YES" or (keyword != "NO" and is_about_100(XYZ))
+
+
+def is_about_100(XYZ: Float64Array) -> bool:
+    """Whether the brightest of XYZ (n, 3) is so near to 100 that it was made 100."""
+    return abs(float(XYZ[:, 1].max()) - 100) < 1
 
 
 def _stated_luminance(text: str) -> float | None:
@@ -177,36 +188,19 @@ def _stated_luminance(text: str) -> float | None:
 
 
 def _from_csv(text: str, path: Path) -> tuple[Measurements, Emission | None]:
-    lines = [
-        (number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
-    ]
-    if len(lines) < 2:
-        raise DisplayError("holds no measurements", where=path, remedy="give a header and one row a patch")
-    delimiter = max(",;\t", key=lines[0][1].count)
-    rows = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), delimiter=delimiter))
-    header = [cell.strip() for cell in rows[0]]
-    body = [(number, [cell.strip() for cell in row]) for (number, _), row in zip(lines[1:], rows[1:], strict=True)]
-    for number, row in body:
-        if len(row) != len(header):
-            raise DisplayError(
-                f"{len(row)} columns, the header has {len(header)}",
-                where=f"{path}, line {number}",
-                remedy="correct the row",
-            )
+    header, body = parse_table(text, path, "give a header and one row a patch")
     if header[0].casefold() in ("color", "colour", "channel", "name", "patch"):
         return _named_rows(header, body, path), None
     return _code_rows(header, body, path)
 
 
-def _code_rows(
-    header: list[str], body: list[tuple[int, list[str]]], path: Path
-) -> tuple[Measurements, Emission | None]:
+def _code_rows(header: list[str], body: Rows, path: Path) -> tuple[Measurements, Emission | None]:
     """Rows of codes with X, Y, Z or x, y, Y or a spectrum; the other columns do not count."""
     colour = header[3:6] if header[3:6] in (["X", "Y", "Z"], ["x", "y", "Y"]) else []
     bands = [index for index in range(3 + len(colour), len(header)) if wavelength(header[index]) is not None]
     used = [*range(3 + len(colour)), *bands]
     usable = header[:3] == ["R", "G", "B"]
-    table = np.array([[_value(row[index], path, number) for index in used] for number, row in body if usable])
+    table = number_columns(body if usable else [], used, path)
     spectra = emission([header[index] for index in bands], list(table.T[3 + len(colour) :]), path) if usable else None
     if not usable or not (colour or spectra):
         raise DisplayError(
@@ -217,11 +211,11 @@ def _code_rows(
     codes = table[:, :3] / (255.0 if table[:, :3].max() > 1 else 1.0)
     XYZ = table[:, 3:6] if colour else np.zeros((0, 3))
     XYZ = _xyY_to_XYZ(XYZ, path) if colour[:1] == ["x"] else XYZ
-    relative = not colour or abs(XYZ[:, 1].max() - 100) < 1
+    relative = not colour or is_about_100(XYZ)
     return Measurements(frozen(codes), frozen(XYZ), "relative" if relative else "cd/m2"), spectra
 
 
-def _named_rows(header: list[str], body: list[tuple[int, list[str]]], path: Path) -> Measurements:
+def _named_rows(header: list[str], body: Rows, path: Path) -> Measurements:
     """Rows Red, Green, Blue, White, perhaps Black, with luminance, x and y."""
     keys = [name.casefold() for name in header]
     luminance = next((keys.index(each) for each in _LUMINANCE_HEADERS if each in keys), None)
@@ -243,7 +237,7 @@ def _named_rows(header: list[str], body: list[tuple[int, list[str]]], path: Path
                 f"'{row[0]}' is no known patch", where=f"{path}, line {number}", remedy=f"use {', '.join(_NAMED_CODES)}"
             )
         codes.append(_NAMED_CODES[name])
-        xyY.append([_value(row[index], path, number) for index in (*columns, luminance)])
+        xyY.append([finite_number(row[index], f"{path}, line {number}") for index in (*columns, luminance)])
     relative = keys[luminance] == "y_relative"
     return Measurements(frozen(codes), frozen(_xyY_to_XYZ(np.array(xyY), path)), "relative" if relative else "cd/m2")
 
@@ -254,13 +248,3 @@ def _xyY_to_XYZ(xyY: Float64Array, path: Path) -> Float64Array:
         raise DisplayError("a chromaticity y or a luminance is not above 0", where=path, remedy="correct the reading")
     safe = np.where(y > 0, y, 1.0)
     return np.stack([x / safe * Y, Y, (1 - x - y) / safe * Y], axis=1)
-
-
-def _value(cell: str, path: Path, number: int) -> float:
-    try:
-        value = float(cell)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise DisplayError(f"'{cell}' is no finite number", where=f"{path}, line {number}", remedy="correct the cell")
-    return value

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import datetime
-import io
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
+from spectral_core.display.tables import Rows, number_columns, parse_table
 from spectral_core.errors import DisplayError
 from spectral_core.files import atomic_path, read_text
 
@@ -233,29 +233,10 @@ def _seconds(cell: str, where: str) -> float:
     return seconds
 
 
-def _table(path: Path, remedy: str) -> tuple[list[str], list[tuple[int, list[str]]]]:
+def _table(path: Path, remedy: str) -> tuple[list[str], Rows]:
     """Header and rows with their line numbers; all rows as long as the header."""
     text = read_text(path, DisplayError, remedy)
-    lines = [
-        (number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")
-    ]
-    if len(lines) < 2:
-        raise DisplayError("holds no rows", where=path, remedy=remedy)
-    delimiter = max(",;\t", key=lines[0][1].count)
-    try:
-        cells = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), delimiter=delimiter))
-    except csv.Error as error:
-        raise DisplayError(f"is no CSV ({error})", where=path, remedy=remedy) from None
-    header = [cell.strip() for cell in cells[0]]
-    rows = [(number, [cell.strip() for cell in row]) for (number, _), row in zip(lines[1:], cells[1:], strict=False)]
-    wrong = next((number for number, row in rows if len(row) != len(header)), None)
-    if wrong is not None or len(cells) != len(lines):
-        raise DisplayError(
-            f"not as many columns as the header ({len(header)})",
-            where=path if wrong is None else f"{path}, line {wrong}",
-            remedy="correct the row",
-        )
-    return header, rows
+    return parse_table(text, path, remedy)
 
 
 def _require(header: Sequence[str], names: Sequence[str], path: Path) -> None:
@@ -264,23 +245,9 @@ def _require(header: Sequence[str], names: Sequence[str], path: Path) -> None:
         raise DisplayError(f"lacks the column {missing[0]}", where=path, remedy=f"the header is {','.join(names)}")
 
 
-def _columns(
-    header: Sequence[str], rows: Sequence[tuple[int, list[str]]], names: Sequence[str], path: Path
-) -> Float64Array:
+def _columns(header: list[str], rows: Rows, names: Sequence[str], path: Path) -> Float64Array:
     """Finite numbers (n, len(names)) of the named columns."""
-    at = [header.index(each) for each in names]
-    values = np.empty((len(rows), len(names)))
-    for row, (number, cells) in enumerate(rows):
-        for column, index in enumerate(at):
-            try:
-                values[row, column] = float(cells[index])
-            except ValueError:
-                values[row, column] = math.nan
-            if not math.isfinite(values[row, column]):
-                raise DisplayError(
-                    f"'{cells[index]}' is no finite number", where=f"{path}, line {number}", remedy="correct the cell"
-                )
-    return values
+    return number_columns(rows, [header.index(each) for each in names], path)
 
 
 def _each(patches: PatchList) -> Iterable[tuple[Float64Array, str]]:

@@ -192,7 +192,7 @@ def test_all_formats_hold_the_same_readings(tmp_path: Path) -> None:
         ("Color,L,x,y\nPink,30,0.6,0.3\n", "Pink"),
         ("Color,L,x,y\nRed,30,0.6,0\n", "not above 0"),
         ("R,G,B,X,Y,Z\n1,1,1,95,100,0\n", "not above 0"),
-        ("R,G,B,X,Y,Z\n", "no measurements"),
+        ("R,G,B,X,Y,Z\n", "no rows"),
         ("CTI3\nBEGIN_DATA_FORMAT\nRGB_R\n", "END_DATA_FORMAT"),
         ("CTI3\nBEGIN_DATA_FORMAT\nRGB_R RGB_G\nEND_DATA_FORMAT\nBEGIN_DATA\n1 2 3\nEND_DATA\n", "3 values for 2"),
     ],

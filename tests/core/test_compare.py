@@ -145,8 +145,8 @@ def test_a_plot_is_written(run: Run, csv: Csv, tmp_path: Path) -> None:
         ("X,Y,Z\n1,2,3\n", "X,Y,Z\n1,nan,3\n", ("--white", D65), "line 2"),
         ("X,Y,Z\n1,2,3\n", "X,Y,Z\n1,2\n", ("--white", D65), "line 2"),
         ("X,Y,Z\n1,2,3\n", "x,y,Y\n0.3,0,3\n", ("--white", D65), "y is not above 0"),
-        ("X,Y,Z\n1,2,3\n", "X,Y,Z\n", ("--white", D65), "no colours"),
-        ("X,Y,Z\n1,2,3\n", "", ("--white", D65), "no measurements"),
+        ("X,Y,Z\n1,2,3\n", "X,Y,Z\n", ("--white", D65), "no rows"),
+        ("X,Y,Z\n1,2,3\n", "", ("--white", D65), "no rows"),
     ],
 )
 def test_unusable_input_gets_one_line(

@@ -123,8 +123,8 @@ def test_repeats_are_held_out_together(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "fewer than two"),
-        ("x_deg,y_deg,Y\n0,0,100\n", "fewer than two"),
+        ("", "no rows"),
+        ("x_deg,y_deg,Y\n0,0,100\n", "one point"),
         ("x,y,Y\n0,0,100\n1,1,90\n", "header"),
         ("x_deg,y_deg,Y\n0,0,100\n1,1\n", "line 3"),
         ("x_deg,y_deg,Y\n0,0,100\n1,1,nan\n", "line 3"),
@@ -135,7 +135,7 @@ def test_repeats_are_held_out_together(tmp_path: Path) -> None:
         ("x_deg,y_deg,Y\n0,0,100\n1000,0,99\n", "degrees"),
         ("x_deg,y_deg,x,y,Y\n0,0,0.3,0,100\n1,0,0.3,0.3,99\n", "not above 0"),
         ("x_deg,y_deg,R,G,B,X,Y,Z\n0,0,1,0,0,50,25,2\n9,0,1,0,0,50,25,2\n", "white"),
-        (f"x_deg,y_deg,Y\n0,0,100\n1,1,{'9' * 200_000}\n", "is it a CSV"),
+        (f"x_deg,y_deg,Y\n0,0,100\n1,1,{'9' * 200_000}\n", "is no CSV"),
     ],
 )
 def test_unusable_readings_get_one_line(run: Run, tmp_path: Path, text: str, message: str) -> None:
