@@ -22,13 +22,6 @@ def is_file(path: Path) -> bool:
         return False
 
 
-def _exists(path: Path) -> bool:
-    try:
-        return path.exists()
-    except OSError:  # too long a name
-        return False
-
-
 def why_no_file(path: Path) -> str:
     """What is wrong with a path that should have named a file."""
     try:
@@ -70,12 +63,13 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         If the folder cannot be made or written to, or `path` is a folder or a device.
     """
     target = Path(path)
-    # A link stays a link: what it points to is replaced.
-    target = target.resolve() if target.is_symlink() else target
-    if _exists(target) and not is_file(target):
-        what = "is a folder" if target.is_dir() else "is no ordinary file"  # renaming would replace a device
-        raise OutputError(what, where=path, remedy="name a file")
     try:
+        # A link stays a link: what it points to is replaced.
+        target = target.resolve() if target.is_symlink() else target
+        if target.exists() and not target.is_file():  # renaming would make a file of a device
+            raise OutputError(
+                "is a folder" if target.is_dir() else "is no ordinary file", where=path, remedy="name a file"
+            )
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
         os.close(handle)

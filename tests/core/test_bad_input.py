@@ -296,6 +296,7 @@ def test_devices_and_links_are_not_replaced(run: Run, tmp_path: Path) -> None:
     pipe, real, link = tmp_path / "pipe", tmp_path / "real.csv", tmp_path / "link.csv"
     os.mkfifo(pipe)
     refused(run("patches", "new", "-o", pipe), "no ordinary file")
+    refused(run("patches", "new", "-o", tmp_path / ("n" * 300)), "cannot be written")
     assert pipe.is_fifo()
     real.write_text("before")
     link.symlink_to(real)
