@@ -60,10 +60,16 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     OutputError
-        If the folder cannot be made or written to.
+        If the folder cannot be made or written to, or `path` is a folder or a device.
     """
     target = Path(path)
     try:
+        # A link stays a link: what it points to is replaced.
+        target = target.resolve() if target.is_symlink() else target
+        if target.exists() and not target.is_file():  # renaming would make a file of a device
+            raise OutputError(
+                "is a folder" if target.is_dir() else "is no ordinary file", where=path, remedy="name a file"
+            )
         target.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
         os.close(handle)

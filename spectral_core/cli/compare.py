@@ -8,7 +8,7 @@ import click
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.cli.console import Document, emit, rounded, table
+from spectral_core.cli.console import Document, emit, naming, rounded, table
 from spectral_core.cli.options import as_json, observer_option
 from spectral_core.display import load_profile
 from spectral_core.display.judging.comparison import (
@@ -19,6 +19,7 @@ from spectral_core.display.judging.comparison import (
     unit_warnings,
 )
 from spectral_core.display.judging.comparison import compare as pair
+from spectral_core.display.measuring.tables import finite_number
 from spectral_core.errors import DisplayError
 
 _PATH = click.Path(path_type=Path)
@@ -49,7 +50,9 @@ def compare(
         predicted, measured = read_colours(first, observer), read_colours(second, observer)
     else:
         measured = read_colours(first, observer)
-        predicted, scaled = predict(measured, load_profile(str(profile)))
+        display = load_profile(str(profile))
+        with naming(first):
+            predicted, scaled = predict(measured, display)
         warnings += ["no absolute unit in common: the profile's white was scaled to the measured"] if scaled else []
     white_XYZ, source = _white(predicted, measured, white)
     compared = pair(predicted, measured, white_XYZ)
@@ -111,10 +114,10 @@ def _white(predicted: Colours, measured: Colours, given: str | None) -> tuple[Fl
 
 def _parse_white(text: str) -> Float64Array:
     try:
-        values = np.array([float(part) for part in text.split(",")])
-    except ValueError:
+        values = np.array([finite_number(part.strip(), "--white") for part in text.split(",")])
+    except DisplayError:
         values = np.zeros(0)
-    if values.shape != (3,) or not (np.isfinite(values) & (values > 0)).all():
+    if values.shape != (3,) or not (values > 0).all():
         raise DisplayError(f"--white '{text}' is no white", remedy="give three numbers above 0, as 95.05,100,108.88")
     return values
 

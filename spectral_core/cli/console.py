@@ -6,11 +6,14 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from spectral_core.errors import DisplayError
 
 Document = dict[str, Any]
 Report = Callable[[float, str], None]
@@ -63,6 +66,15 @@ def facts(document: Document, leave_out: Sequence[str] = ()) -> Table:
     for key, value in shown:
         made.add_row(key, cell(value))
     return made
+
+
+@contextmanager
+def naming(file: Path) -> Iterator[None]:
+    """Whatever is wrong with what was read from a file names it."""
+    try:
+        yield
+    except DisplayError as error:
+        raise DisplayError(error.problem, where=error.where or file, remedy=error.remedy) from None
 
 
 @contextmanager

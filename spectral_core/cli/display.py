@@ -13,12 +13,13 @@ from typing import Any
 import click
 
 from spectral_core.arrays import Float64Array
-from spectral_core.cli.console import Document, emit, progress_bar
+from spectral_core.cli.console import Document, emit, naming, progress_bar
 from spectral_core.cli.display_tables import show_advice, show_characterisation
 from spectral_core.cli.options import FiniteRange, as_json, observer_option, profile_option
 from spectral_core.cli.profile import make_profile, profile_warnings, state_options
 from spectral_core.display import load_profile, write_profile
 from spectral_core.display.characterising.advice import LARGEST, advise
+from spectral_core.display.characterising.characterise import Characterisation
 from spectral_core.display.characterising.characterise import characterise as choose
 from spectral_core.display.judging.eyes import eye_difference
 from spectral_core.display.limits.gamut import GAMUT_RULES, GamutCounts, map_to_gamut
@@ -65,6 +66,8 @@ def characterise(
     if wants_advice:
         if model is not None:
             raise click.UsageError("--advise chooses the model itself; leave --model out")
+        if report is not None or right is not None or any(value is not None for value in given.values()):
+            raise click.UsageError("--advise writes patches only; leave --report, --right and the state out")
         _advise(None if file is None else read_measurements(file, observer), output, accuracy, patches, json)
         return
     if file is None:
@@ -73,20 +76,31 @@ def characterise(
         raise click.UsageError("--accuracy and --patches belong to --advise")
     if right is not None and report is None:
         raise DisplayError("--right is for a report of both eyes", remedy="give --report FILE.html as well")
-    measured = read_measurements(file, observer)
-    found = choose(measured, model)
+    if output is None and any(value is not None for value in given.values()):
+        raise click.UsageError("the state of the headset is kept in a profile; give -o FILE.json as well")
+    measured, found = _characterised(file, model, observer)
     document = characterise_document(found, measured)
-    if report is not None:
-        document |= _write_report(report, Eye("display", file.name, measured, found), right, model, observer)
+    profile = None
     if output is not None:
         source = f"characterised from {file.name}, {len(found.measured.codes)} patches, {measured.instrument}".rstrip(
             ", "
         )
         profile = make_profile(output.stem, found.chosen.model, source, measured, given)
+    # Nothing is written before everything is known to be right.
+    if report is not None:
+        document |= _write_report(report, Eye("display", file.name, measured, found), right, model, observer)
+    if output is not None and profile is not None:
         write_profile(profile, output)
         document["file"] = str(output)
         document["warnings"] += profile_warnings(profile, measured)
     emit(document, json, lambda console: show_characterisation(console, document))
+
+
+def _characterised(file: Path, model: str | None, observer: str) -> tuple[Measurements, Characterisation]:
+    """The measurements of a file and its models."""
+    measured = read_measurements(file, observer)
+    with naming(file):
+        return measured, choose(measured, model)
 
 
 def _advise(
@@ -122,9 +136,16 @@ def convert(profile: str, target: str, gamut: Any, keep: bool, file: Path | None
     channel, or keep their chromaticity and lose luminance (`chromaticity`), or give codes outside
     0..1 (`keep`); they are counted on standard error.
     """
+    if keep and gamut == "chromaticity":
+        raise click.UsageError("--keep and --gamut chromaticity exclude each other")
     display = load_profile(profile)
     values = _read(file, _HEADERS[target])
     if target == "xyz":
+        beyond = int(((values < 0) | (values > 1)).any(axis=1).sum())
+        if beyond:
+            print(
+                f"warning: {beyond} of {len(values)} codes are outside 0..1: the model is extrapolated", file=sys.stderr
+            )
         result = display.to_XYZ(values) * display.white_Y
     else:
         result, counts = map_to_gamut(display, values / display.white_Y, "keep" if keep else gamut)
@@ -143,8 +164,7 @@ def _write_report(report: Path, eye: Eye, right: Path | None, model: str | None,
     document: Document = {"report": str(report)}
     eyes = [eye]
     if right is not None:
-        measured = read_measurements(right, observer)
-        found = choose(measured, model)
+        measured, found = _characterised(right, model, observer)
         eyes = [replace(eye, name="left eye"), Eye("right eye", right.name, measured, found)]
         difference = eye_difference(eye.found, found, eye.read, measured)
         document |= {"right": characterise_document(found, measured), "eyes": asdict(difference)}
@@ -169,7 +189,7 @@ def _told(counts: GamutCounts) -> str:
 def _read(file: Path | None, header: list[str]) -> Float64Array:
     """The three columns (n, 3) under a header."""
     path = file or Path("standard input")
-    text = sys.stdin.read() if file is None else read_text(file, DisplayError, "give a CSV of colours")
+    text = _standard_input(path) if file is None else read_text(file, DisplayError, "give a CSV of colours")
     missing = DisplayError(f"does not begin with the header {','.join(header)}", where=path, remedy="add it")
     if not text.strip():
         raise missing
@@ -177,3 +197,10 @@ def _read(file: Path | None, header: list[str]) -> Float64Array:
     if list(table.header[:3]) != header:
         raise missing
     return table.numbers_at(range(3))
+
+
+def _standard_input(path: Path) -> str:
+    try:
+        return sys.stdin.read().removeprefix("\ufeff")
+    except UnicodeDecodeError:
+        raise DisplayError("is not a text in UTF-8", where=path, remedy="give a CSV of colours") from None

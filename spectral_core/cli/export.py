@@ -43,6 +43,8 @@ def export(
     """
     if sum(each is not None for each in (ocio, cube, icc)) != 1:
         raise DisplayError("give one of --ocio, --cube and --icc", remedy="one export at a time")
+    if base is not None and ocio is None:
+        raise DisplayError("--base belongs to --ocio", remedy="leave it out")
     display = load_profile(profile)
     if ocio is not None:
         made = export_ocio(display, ocio, base or blender_config())

@@ -10,7 +10,7 @@ import click
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.cli.console import Document, emit, facts, rounded, table
+from spectral_core.cli.console import Document, emit, facts, naming, rounded, table
 from spectral_core.cli.options import FiniteRange, as_json, observer_option, profile_option
 from spectral_core.display import load_profile
 from spectral_core.display.judging.field import FieldReport, field_report, read_field
@@ -74,7 +74,8 @@ def field(readings: Path, plot: Path | None, json: bool) -> None:
 
     Columns: x_deg,y_deg (right and up from the centre), then Y, or x,y,Y, or R,G,B,X,Y,Z.
     """
-    found = field_report(read_field(readings))
+    with naming(readings):
+        found = field_report(read_field(readings))
     if plot is not None:
         write_field_plot(found, plot)
     document: Document = {

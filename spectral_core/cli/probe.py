@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from spectral_core.cli.console import Document, emit, facts, rounded, table
+from spectral_core.cli.console import Document, emit, facts, naming, rounded, table
 from spectral_core.cli.options import as_json, observer_option
 from spectral_core.display import DisplayProfile, load_profile
 from spectral_core.display.characterising.repeats import noise
@@ -44,13 +44,16 @@ def probe(
     READINGS is Argyll's .ti3 or CSV as for `characterise`, with the codes that the application sent.
     """
     if patches:
+        if readings is not None or profile is not None:
+            raise click.UsageError("--patches only writes what to measure; leave the readings and --profile out")
         _patches(output, json)
         return
     if readings is None:
         raise DisplayError("no readings", remedy="name a file, or ask for the sequence to measure with --patches")
     display = None if profile is None else load_profile(profile)
     measured = read_measurements(readings, observer)
-    found = infer(measured, None if display is None else display.model)
+    with naming(readings):
+        found = infer(measured, None if display is None else display.model)
     document = probe_document(found, measured, display)
     if output is not None and document["correction"] is not None:
         write_correction({key: document[key] for key in ("runtime", "parameters", "correction", "unreachable")}, output)

@@ -18,7 +18,7 @@ from spectral_core.display import DisplayProfile, load_profile, write_profile
 from spectral_core.display.limits.luminance import scene_white
 from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.measuring.state import EYES, HeadsetState
-from spectral_core.display.models import DisplayModel
+from spectral_core.display.models import LEAST_LIGHT, DisplayModel
 from spectral_core.display.models.fitting import gamma_fit
 from spectral_core.display.profile import MODELS
 from spectral_core.errors import DisplayError
@@ -154,7 +154,7 @@ def profile_document(display: DisplayProfile) -> Document:
             for channel, XYZ in zip(_CHANNELS, primaries, strict=True)
         },
         "black_XYZ": black.tolist(),
-        "contrast": float(white[1] / black[1]) if black[1] > 0 else None,
+        "contrast": float(white[1] / black[1]) if black[1] > LEAST_LIGHT else None,
         "gamma": {channel: _gamma(display.model, index) for index, channel in enumerate(_CHANNELS)},
         "peak_luminance_cd_m2": _times(white[1], display.white_luminance_cd_m2),
         "black_luminance_cd_m2": _times(black[1], display.white_luminance_cd_m2),

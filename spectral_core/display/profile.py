@@ -33,7 +33,9 @@ GAMUT_TOLERANCE = 1e-4
 UNITS = ("cd/m2", "relative")
 # Brighter than any display: the sun's disc.
 _LARGEST_LUMINANCE = 2e9
-_LARGEST_FLOAT = float(np.finfo(np.float64).max)
+_LEAST_SCENE_WHITE = 1e-9
+# In whatever unit: beyond these the products of a profile overflow.
+_WHITE_Y = (1e-6, 1e12)
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,12 @@ class DisplayProfile:
     scene_white: float | None = None
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "white_Y", _positive("white_Y", self.white_Y, _LARGEST_FLOAT))
+        object.__setattr__(self, "white_Y", _number("white_Y", self.white_Y, *_WHITE_Y))
         if self.unit not in UNITS:
             raise DisplayError("'unit' is no unit of luminance", remedy=f"use {' or '.join(UNITS)}")
         luminance = self.white_Y if self.unit == "cd/m2" else self.white_luminance_cd_m2
         if luminance is not None:
-            luminance = _positive("white_luminance_cd_m2", luminance, _LARGEST_LUMINANCE)
+            luminance = _number("white_luminance_cd_m2", luminance, _WHITE_Y[0], _LARGEST_LUMINANCE)
         if self.white_luminance_cd_m2 not in (None, luminance):
             raise DisplayError(
                 f"white has {self.white_luminance_cd_m2} cd/m2, but {self.white_Y} in the measurements",
@@ -84,7 +86,7 @@ class DisplayProfile:
             )
         object.__setattr__(self, "white_luminance_cd_m2", luminance)
         if self.scene_white is not None:
-            object.__setattr__(self, "scene_white", _positive("scene_white", self.scene_white, 1.0))
+            object.__setattr__(self, "scene_white", _number("scene_white", self.scene_white, _LEAST_SCENE_WHITE, 1.0))
 
     def to_XYZ(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3), white Y = 1, of device codes (..., 3) from 0 to 1."""
@@ -104,10 +106,10 @@ def in_gamut(values: FloatArray) -> BoolArray:
     return np.asarray(((values >= -GAMUT_TOLERANCE) & (values <= 1 + GAMUT_TOLERANCE)).all(axis=-1))
 
 
-def _positive(name: str, value: Any, largest: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 < value <= largest:
-        limit = "" if largest > _LARGEST_LUMINANCE else f" and up to {largest:g}"
-        raise DisplayError(f"'{name}' is no number above 0{limit}", remedy="correct it")
+def _number(name: str, value: Any, low: float, high: float) -> float:
+    # NaN is in no range, and an integer too long for a float can still be compared.
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise DisplayError(f"'{name}' is no number from {low:g} to {high:g}", remedy="correct it")
     return float(value)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -287,3 +288,42 @@ def test_without_blender_one_line_says_how_to_get_it(run: Run, monkeypatch: pyte
     refused(run("build", SCENE, "-o", tmp_path / "x.blend"), "needs Blender", "pip install")
     monkeypatch.setenv("BLENDER", str(tmp_path / "no-blender"))
     refused(run("build", SCENE, "-o", tmp_path / "x.blend"), "no-blender", "names no program")
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no such files")
+def test_devices_and_links_are_not_replaced(run: Run, tmp_path: Path) -> None:
+    """A file comes into place by renaming, which would make an ordinary file of a device."""
+    pipe, real, link = tmp_path / "pipe", tmp_path / "real.csv", tmp_path / "link.csv"
+    os.mkfifo(pipe)
+    refused(run("patches", "new", "-o", pipe), "no ordinary file")
+    refused(run("patches", "new", "-o", tmp_path / ("n" * 300)), "cannot be written")
+    assert pipe.is_fifo()
+    real.write_text("before")
+    link.symlink_to(real)
+    assert run("patches", "new", "-o", link)[0] == 0
+    assert link.is_symlink()
+    assert real.read_text().startswith("R,G,B")
+
+
+def test_options_that_have_no_effect_are_refused(run: Run, csv: Csv, tmp_path: Path) -> None:
+    path = csv("R,G,B,X,Y,Z\n1,1,1,95,100,109\n1,0,0,41,21,2\n0,1,0,36,72,12\n0,0,1,18,7,95\n")
+    refused(run("characterise", path, "--eye", "left"), "-o")
+    refused(run("characterise", path, "--advise", "--eye", "left"), "--advise")
+    refused(run("probe", path, "--patches"), "--patches")
+    refused(run("convert", "--to", "codes", "--keep", "--gamut", "chromaticity", path), "exclude")
+    refused(run("profile", "export", "sRGB", "--icc", tmp_path / "x.icc", "--base", path), "--base")
+
+
+def test_a_report_is_not_written_if_the_profile_cannot_be(run: Run, csv: Csv, tmp_path: Path) -> None:
+    path = csv("R,G,B,X,Y,Z\n1,1,1,95,100,109\n1,0,0,41,21,2\n0,1,0,36,72,12\n0,0,1,18,7,95\n")
+    report = tmp_path / "r.html"
+    report.write_text("before")
+    refused(run("characterise", path, "--report", report, "-o", tmp_path / "p.json", "--date", "today"), "ISO date")
+    assert report.read_text() == "before"
+
+
+def test_codes_beyond_the_range_are_counted(run: Run, csv: Csv) -> None:
+    code, out, err = run("convert", "--to", "xyz", csv("R,G,B\n255,0,0\n1,1,1\n"))
+    assert code == 0
+    assert "1 of 2 codes are outside 0..1" in err
+    assert len(out.splitlines()) == 3

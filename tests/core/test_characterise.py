@@ -264,3 +264,69 @@ def test_characterise_and_convert_on_the_command_line(run: Run, tmp_path: Path, 
     assert "1 of 3" in err
     back.write_text("X,Y,Z\n1,2\n")
     assert run("convert", "--profile", profile, "--to", "codes", back)[0] == 2
+
+
+TI3 = """CTI3
+
+NORMALIZED_TO_Y_100 "{normalised}"
+LUMINANCE_XYZ_CDM2 "118.9 125.0 136.1"
+BEGIN_DATA_FORMAT
+RGB_R RGB_G RGB_B SPEC_450 SPEC_550 SPEC_650
+END_DATA_FORMAT
+BEGIN_DATA
+100 100 100 1.01 1.01 1.01
+100 0 0 0 0.1 1
+0 100 0 0 0.8 0
+0 0 100 1 0.1 0
+0 0 0 0.01 0.01 0.01
+END_DATA
+"""
+
+
+@pytest.mark.parametrize("normalised", ["NO", "YES"])
+def test_spectra_alone_are_relative_and_keep_the_luminance_that_the_file_states(
+    tmp_path: Path, normalised: str
+) -> None:
+    """Their white is scaled to 100: that is no luminance, which the keyword has."""
+    path = tmp_path / "spectra.ti3"
+    path.write_text(TI3.format(normalised=normalised))
+    measured = read_measurements(path)
+    assert measured.unit == "relative"
+    assert measured.white_XYZ[1] == pytest.approx(100, abs=1e-9)  # scaled by it
+    assert measured.white_luminance_cd_m2 == 125.0
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("0 0.8 0", "0 nan 0", "line 11: 'nan' is no finite number"),
+        ("0 0.8 0", '0 "0.8 0', "line 11: a quotation mark"),
+        ("SPEC_550", "SPEC_450", "SPEC_450 occurs twice"),
+    ],
+)
+def test_a_ti3_with_a_wrong_cell_is_refused_with_its_line(tmp_path: Path, old: str, new: str, message: str) -> None:
+    """A band or a column is never left out in silence."""
+    path = tmp_path / "spectra.ti3"
+    path.write_text(TI3.format(normalised="YES").replace(old, new))
+    with pytest.raises(DisplayError, match=message):
+        read_measurements(path)
+
+
+def test_readings_that_no_display_gives_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "readings.csv"
+    good = "R,G,B,X,Y,Z\n1,1,1,95,100,109\n1,0,0,41,21,2\n0,1,0,36,72,12\n0,0,1,18,7,95\n"
+    path.write_text(good)
+    read_measurements(path)
+    for row, message in {
+        ".5,.5,.5,1e4,9,9": "patch 5 reads",
+        ".5,.5,.5,9,-5,9": "patch 5 reads",
+        ".5,.5,.5,1e300,9,9": "line 6: '1e300' is larger",
+        ".5,.5,.5,1_0,9,9": "line 6: '1_0' is no finite",
+        '.5,.5,.5,"9,9,9': "line 6: 4 columns",
+    }.items():
+        path.write_text(f"{good}{row}\n")
+        with pytest.raises(DisplayError, match=message):
+            read_measurements(path)
+    path.write_text(good.replace("36,72,12", "41,21.001,2"))
+    with pytest.raises(DisplayError, match="too alike"):
+        read_measurements(path)

@@ -101,7 +101,7 @@ def test_lists_of_8_bit_levels_with_names_in_any_order(tmp_path: Path) -> None:
         ("", "holds no rows"),
         ("R,G,B\n", "holds no rows"),
         ("R,G\n1,2\n", "lacks the column B"),
-        ("R,G,B\n1,0\n", r"line 2: not as many columns as the header \(3\)"),
+        ("R,G,B\n1,0\n", "line 2: 2 columns, the header has 3"),
         ("R,G,B\n1,0,nan\n", "line 2: 'nan' is no finite number"),
         ("R,G,B\n1,0,0\n300,0,0\n", "line 3: device codes outside"),
         ("R,G,B\n-0.1,0,0\n", "line 2: device codes outside"),

@@ -96,6 +96,23 @@ def characterise(measured: Measurements, wanted: str | None = None) -> Character
     return Characterisation(chosen, results, measured, checks, gamma, tuple(dict.fromkeys(warnings)))
 
 
+def fitted(kind: ModelKind, measured: Measurements) -> DisplayModel:
+    """The model of a kind.
+
+    Raises
+    ------
+    DisplayError
+        If its parameters are none that a display can have.
+    """
+    try:
+        return kind.fit(measured)
+    except DisplayError as error:
+        raise DisplayError(
+            f"a model '{kind.name}' cannot be fitted: {error.problem}",
+            remedy="are the codes and the readings those of one display?",
+        ) from None
+
+
 def folds(measured: Measurements) -> list[IntArray]:
     """Indices of the held-out mixed colours of each fold; ramps and greys are always fitted."""
     mixed = np.random.default_rng(_SEED).permutation(np.flatnonzero(measured.mixed))
@@ -116,7 +133,7 @@ def held_out_XYZ(measured: Measurements, kind: ModelKind) -> Float64Array:
     for test in folds(measured):
         kept = np.ones(len(measured.codes), dtype=bool)
         kept[test] = False
-        found.append(kind.fit(measured.subset(kept)).forward(measured.codes[test]))
+        found.append(fitted(kind, measured.subset(kept)).forward(measured.codes[test]))
     return np.concatenate(found)
 
 
@@ -130,7 +147,7 @@ def held_out_errors(measured: Measurements, predicted: Float64Array) -> Float64A
 
 
 def _on_trial(measured: Measurements, kind: ModelKind) -> ModelResult:
-    model = kind.fit(measured)
+    model = fitted(kind, measured)
     predicted = held_out_XYZ(measured, kind)
     outside = held_out_errors(measured, predicted)
     inside = errors(model, measured, measured.white_XYZ)

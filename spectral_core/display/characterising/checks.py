@@ -24,6 +24,7 @@ from spectral_core.display.characterising.verdicts import (
     untold,
 )
 from spectral_core.display.measuring.measurements import Measurements
+from spectral_core.display.models import LEAST_LIGHT
 
 # In percent of white: above it the contrast is below 100:1, which is stray light or a lifted black.
 # Black of the published headset is 0.4 %.
@@ -104,7 +105,11 @@ def _black(measured: Measurements, share: float) -> Verdict:
         return untold(name, unit, "measure black (codes 0): without it black is taken as 0")
     percent = 100 * share
     passed = percent <= _BLACK_PERCENT
-    found = f"black is {percent:.2g} % of white, a contrast of {1 / share:.0f}:1" if share > 0 else "black reads 0"
+    found = (
+        f"black is {percent:.2g} % of white, a contrast of {1 / share:.0f}:1"
+        if share > LEAST_LIGHT
+        else "black reads 0"
+    )
     advice = found if passed else f"{found}: keep stray light out, and let nothing lift the codes"
     details = {"black_Y": float(measured.black_XYZ[1])}
     return Verdict(name, percent, unit, _BLACK_PERCENT, "a contrast of 100:1", passed, advice, details)

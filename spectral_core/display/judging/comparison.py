@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array, IntArray, frozen
-from spectral_core.display.measuring.measurements import SAME_CODE, read_measurements
+from spectral_core.display.measuring.measurements import SAME_CODE, is_about_100, read_measurements
 from spectral_core.display.measuring.tables import CODES, COLOURS, parse_table, unit_codes
 from spectral_core.display.profile import DisplayProfile
 from spectral_core.errors import DisplayError
@@ -19,6 +19,8 @@ from spectral_core.standards import DEFAULT_OBSERVER, XYZ_to_Lab, delta_E_2000
 _NAMES = ("name", "patch", "sample", "sample_name", "colour", "color", "dot")
 # The hue of what has less chroma than this is noise.
 _LEAST_CHROMA = 1.0
+# A colour beyond this many times the white of L*a*b* is in another unit: dE00 would tell nothing.
+_MOST_WHITES = 1e6
 # Sets whose luminances differ by more than this factor are in different units.
 _SAME_UNIT = 2.0
 _REMEDY = "give a CSV with X,Y,Z or x,y,Y (R,G,B and a name are optional) or a .ti3"
@@ -79,6 +81,11 @@ def compare(predicted: Colours, measured: Colours, white_XYZ: Float64Array) -> C
     """
     partner = _partners(predicted, measured)
     predicted_XYZ, measured_XYZ = predicted.XYZ[partner], measured.XYZ
+    if max(np.abs(predicted_XYZ).max(), np.abs(measured_XYZ).max()) > _MOST_WHITES * white_XYZ.min():
+        raise DisplayError(
+            f"a colour is more than {_MOST_WHITES:g} times the white {white_XYZ.tolist()}",
+            remedy="correct it, or give --white in the unit of the colours",
+        )
     Lab = [XYZ_to_Lab(XYZ, white_XYZ) for XYZ in (predicted_XYZ, measured_XYZ)]
     chroma = [np.hypot(each[:, 1], each[:, 2]) for each in Lab]
     hue = [np.degrees(np.arctan2(each[:, 2], each[:, 1])) for each in Lab]
@@ -108,6 +115,8 @@ def predict(measured: Colours, display: DisplayProfile) -> tuple[Colours, bool]:
     """
     if measured.codes is None:
         raise DisplayError("the readings have no codes", remedy="give R,G,B beside their colours")
+    if ((measured.codes < 0) | (measured.codes > 1)).any():
+        raise DisplayError("device codes outside 0..1 (or 0..255)", remedy="state codes 0..1 or 0..255")
     XYZ = display.to_XYZ(measured.codes)
     absolute = measured.unit == "cd/m2" and display.white_Y != 1.0
     white = measured.white_XYZ()
@@ -144,7 +153,7 @@ def read_colours(path: Path, observer: str = DEFAULT_OBSERVER) -> Colours:
     XYZ = table.XYZ(columns, table.numbers(columns))
     codes = frozen(unit_codes(table.numbers(CODES))) if table.has(CODES) else None
     names = tuple(row[0] for row in table.rows) if table.header[0].casefold() in _NAMES else None
-    relative = abs(XYZ[:, 1].max() - 100) < 1
+    relative = is_about_100(XYZ)
     return Colours(frozen(XYZ), codes, names, "relative" if relative else "cd/m2")
 
 

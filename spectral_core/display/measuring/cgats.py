@@ -9,14 +9,17 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array
+from spectral_core.display.measuring.tables import finite_number
 from spectral_core.errors import DisplayError
 
 _LARGEST_TABLE = 1_000_000
+# Fields that are numbers whatever stands in them; others may be names.
+_NUMERIC = ("RGB_", "XYZ_", "SPEC_")
 
 
 @dataclass(frozen=True)
 class CgatsTable:
-    """The first table of a file: keywords, and numeric columns (rows,) by field name."""
+    """The first table of a file: keywords, and the columns (rows,) of codes, XYZ and spectra by field name."""
 
     keywords: dict[str, str]
     columns: dict[str, Float64Array]
@@ -40,7 +43,10 @@ def parse_cgats(text: str, path: Path) -> CgatsTable:
     form = _section(lines, "BEGIN_DATA_FORMAT", "END_DATA_FORMAT", path)
     data = _section(lines, "BEGIN_DATA", "END_DATA", path)
     fields = [name for number in form for name in lines[number].split()]
-    rows = [(number, _words(lines[number])) for number in data if lines[number].strip()]
+    rows = [(number, _words(lines[number], f"{path}, line {number + 1}")) for number in data if lines[number].strip()]
+    twice = next((name for name in fields if fields.count(name) > 1), None)
+    if twice is not None:
+        raise DisplayError(f"the field {twice} occurs twice", where=path, remedy="drop one of the columns")
     if not fields or not rows or len(fields) * len(rows) > _LARGEST_TABLE:
         raise DisplayError("holds no usable table of measurements", where=path, remedy="measure again")
     for number, words in rows:
@@ -50,11 +56,11 @@ def parse_cgats(text: str, path: Path) -> CgatsTable:
                 where=f"{path}, line {number + 1}",
                 remedy="correct the row",
             )
-    columns = {}
-    for index, name in enumerate(fields):
-        values = [_number(words[index]) for _, words in rows]
-        if all(value is not None for value in values):
-            columns[name] = np.array(values, dtype=np.float64)
+    columns = {
+        name: np.array([finite_number(words[index], f"{path}, line {number + 1}") for number, words in rows])
+        for index, name in enumerate(fields)
+        if name.startswith(_NUMERIC)
+    }
     return CgatsTable(_keywords(lines[: form.start]), columns)
 
 
@@ -72,13 +78,8 @@ def _keywords(lines: list[str]) -> dict[str, str]:
     return {key: value.strip().strip('"') for key, _, value in pairs if key and value}
 
 
-def _words(line: str) -> list[str]:
-    return shlex.split(line) if '"' in line else line.split()
-
-
-def _number(word: str) -> float | None:
+def _words(line: str, where: str) -> list[str]:
     try:
-        value = float(word)
+        return shlex.split(line) if '"' in line else line.split()
     except ValueError:
-        return None
-    return value if np.isfinite(value) else None
+        raise DisplayError("a quotation mark is not closed", where=where, remedy="correct the row") from None

@@ -21,6 +21,12 @@ _LARGEST_DRIFT = 1.5
 # 1 or 2 %, so that ten readings span at most a tenth.
 _LARGEST_SPREAD = 0.2
 _FEWEST_LEVELS = 3
+# Of white's luminance: the Z of a bluish white is not three times it, and dark readings scatter about 0 by less.
+_MOST, _LEAST = 10.0, -0.02
+# In the file's unit: less is no light of a display, whatever the unit.
+_DARKEST_WHITE = 1e-6
+# Condition of the primaries' XYZ: displays have 3 to 30; beyond, instruments cannot tell them apart.
+_MOST_ALIKE = 1e4
 # Of white: a channel without light may read anything less.
 _BACKWARD = 0.01
 
@@ -31,8 +37,9 @@ def refuse_contradictions(measured: Measurements, path: Path) -> None:
     Raises
     ------
     DisplayError
-        For codes outside 0..1, missing or dark primaries, primaries brighter than white, white that
-        repeats with contradictory readings, ramps that run backwards.
+        For codes outside 0..1, missing or dark primaries, primaries brighter than white or alike,
+        readings far above white or below 0, white that repeats with contradictory readings, ramps that
+        run backwards.
     """
     if (measured.codes < 0).any() or (measured.codes > 1 + _CODES).any():
         raise DisplayError("device codes outside 0..1 (or 0..255)", where=path, remedy="state codes 0..1 or 0..255")
@@ -42,9 +49,9 @@ def refuse_contradictions(measured: Measurements, path: Path) -> None:
             raise DisplayError(
                 f"full {name} was not measured",
                 where=path,
-                remedy="measure white and the three primaries at full drive",
+                remedy="measure white and the three primaries at full drive (codes 1 or 255)",
             )
-        if not XYZ[1] > 0 or (name == "white" and not (XYZ > 0).all()):
+        if not XYZ[1] > 0 or (name == "white" and not XYZ.min() > max(_DARKEST_WHITE, 0.01 * XYZ[1])):
             raise DisplayError(f"full {name} reads {XYZ.tolist()}, not above 0", where=path, remedy="measure it again")
         if name != "white" and XYZ[1] > measured.white_XYZ[1]:
             raise DisplayError(
@@ -53,8 +60,35 @@ def refuse_contradictions(measured: Measurements, path: Path) -> None:
                 where=path,
                 remedy=_AGAIN,
             )
+    _refuse_bright_black(measured, path)
+    _refuse_impossible_readings(measured, path)
     _refuse_contradictory_white(measured, path)
+    _refuse_like_primaries(measured, path)
     _refuse_backward_ramps(measured, path)
+
+
+def _refuse_impossible_readings(measured: Measurements, path: Path) -> None:
+    share = measured.XYZ / measured.white_XYZ[1]
+    wrong = ((share > _MOST) | (share < _LEAST)).any(axis=1)
+    if wrong.any():
+        patch = int(wrong.argmax())
+        raise DisplayError(
+            f"patch {patch + 1} reads {measured.XYZ[patch].tolist()} where white has {measured.white_XYZ[1]:.4g}: "
+            "no light of a display",
+            where=path,
+            remedy="correct the row, or measure it again",
+        )
+
+
+def _refuse_like_primaries(measured: Measurements, path: Path) -> None:
+    read = [measured.at(*_FULL[name]) for name in ("red", "green", "blue")]
+    light = np.stack([XYZ - measured.black_XYZ for XYZ in read if XYZ is not None]) / measured.white_XYZ[1]
+    if not np.linalg.cond(light) < _MOST_ALIKE:
+        raise DisplayError(
+            "the light of red, green and blue is too alike to be told apart",
+            where=path,
+            remedy=_AGAIN,
+        )
 
 
 def _refuse_contradictory_white(measured: Measurements, path: Path) -> None:
@@ -92,6 +126,9 @@ def _refuse_backward_ramps(measured: Measurements, path: Path) -> None:
                 where=path,
                 remedy="correct the codes, or measure again",
             )
+
+
+def _refuse_bright_black(measured: Measurements, path: Path) -> None:
     black = measured.black_XYZ[1]
     if black >= measured.white_XYZ[1]:
         raise DisplayError(

@@ -156,16 +156,28 @@ def _from_cgats(text: str, path: Path) -> tuple[Measurements, Emission | None]:
     spectra = emission(names, [table.columns[name] for name in names], path)
     if codes is None or (XYZ is None and spectra is None):
         raise DisplayError("lacks RGB_R... or XYZ_X... columns", where=path, remedy="give a .ti3 of a display")
-    relative = table.keywords.get("NORMALIZED_TO_Y_100", "NO").upper() == "YES"
+    # Spectra alone are scaled to a white of 100, whatever the file says of XYZ that it has not.
+    relative = XYZ is None or _is_normalised(table.keywords.get("NORMALIZED_TO_Y_100", "").upper(), XYZ)
+    stated = _stated_luminance(table.keywords.get("LUMINANCE_XYZ_CDM2", ""))
     measured = Measurements(
         frozen(codes / 100),
         frozen(np.zeros((0, 3)) if XYZ is None else XYZ),
         "relative" if relative else "cd/m2",
         table.keywords.get("TARGET_INSTRUMENT", ""),
         date=iso_date(table.keywords.get("CREATED", "")),
-        white_luminance_cd_m2=_stated_luminance(table.keywords.get("LUMINANCE_XYZ_CDM2", "")) if relative else None,
+        white_luminance_cd_m2=stated if relative else None,
     )
     return measured, spectra
+
+
+def _is_normalised(keyword: str, XYZ: Float64Array) -> bool:
+    """Whether XYZ (n, 3) of a ``.ti3`` are relative; a file that does not say it is judged as a CSV is."""
+    return keyword == "YES" or (keyword != "NO" and is_about_100(XYZ))
+
+
+def is_about_100(XYZ: Float64Array) -> bool:
+    """Whether the brightest of XYZ (n, 3) is so near to 100 that it was made 100."""
+    return abs(float(XYZ[:, 1].max()) - 100) < 1
 
 
 def _stated_luminance(text: str) -> float | None:
@@ -200,7 +212,7 @@ def _code_rows(table: Table) -> tuple[Measurements, Emission | None]:
             remedy="give R,G,B,X,Y,Z or R,G,B,x,y,Y or R,G,B,380,385,..., or named rows with L,x,y",
         )
     XYZ = table.XYZ(colour, values[:, 3:6]) if colour else np.zeros((0, 3))
-    relative = not colour or abs(XYZ[:, 1].max() - 100) < 1
+    relative = not colour or is_about_100(XYZ)
     return Measurements(frozen(unit_codes(values[:, :3])), frozen(XYZ), "relative" if relative else "cd/m2"), spectra
 
 

@@ -18,6 +18,8 @@ from spectral_core.files import read_text
 
 CODES = ("R", "G", "B")
 COLOURS = (("X", "Y", "Z"), ("x", "y", "Y"))
+# The sun's disc has 2e9 cd/m2: what is larger is no reading, and its powers overflow.
+_LARGEST_NUMBER = 1e12
 
 
 @dataclass(frozen=True)
@@ -79,14 +81,27 @@ class Table:
         return xyY_to_XYZ(values)
 
     def _number(self, row: int, place: int) -> float:
-        cell = self.rows[row][place]
-        try:
-            value = float(cell)
-        except ValueError:
-            value = math.nan
-        if not math.isfinite(value):
-            raise DisplayError(f"'{cell}' is no finite number", where=self.where(row), remedy="correct the cell")
-        return value
+        return finite_number(self.rows[row][place], self.where(row))
+
+
+def finite_number(cell: str, where: str) -> float:
+    """What a cell says, and not what else Python would read as a number (``1_0``, other scripts' digits).
+
+    Raises
+    ------
+    DisplayError
+        If it is no number, or one that no instrument reads.
+    """
+    try:
+        value = math.nan if "_" in cell or not cell.isascii() else float(cell)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value):
+        hint = "correct the cell" + (" (with a decimal point)" if "," in cell else "")
+        raise DisplayError(f"'{cell[:40]}' is no finite number", where=where, remedy=hint)
+    if abs(value) > _LARGEST_NUMBER:
+        raise DisplayError(f"'{cell[:40]}' is larger than any reading", where=where, remedy="correct the cell")
+    return value
 
 
 def read_table(path: Path, remedy: str, least: int = 1) -> Table:
@@ -102,7 +117,7 @@ def parse_table(text: str, path: Path, remedy: str, least: int = 1) -> Table:
     DisplayError
         If it is no CSV, has fewer rows than `least`, or one that does not fit the header.
     """
-    lines = [(n, line) for n, line in enumerate(text.splitlines(), 1) if line.strip() and not line.startswith("#")]
+    lines = [(n, line) for n, line in enumerate(text.split("\n"), 1) if line.strip() and not line.startswith("#")]
     if len(lines) < 1 + least:
         raise DisplayError(f"holds {'no' if least < 2 else f'fewer than {least}'} rows", where=path, remedy=remedy)
     delimiter = max(",;\t", key=lines[0][1].count)
@@ -115,7 +130,7 @@ def parse_table(text: str, path: Path, remedy: str, least: int = 1) -> Table:
     wrong = next(((n, row) for n, row in zip(numbers, rows, strict=False) if len(row) != len(header)), None)
     if wrong is not None:
         raise DisplayError(
-            f"not as many columns as the header ({len(header)}), but {len(wrong[1])}",
+            f"{len(wrong[1])} columns, the header has {len(header)}",
             where=f"{path}, line {wrong[0]}",
             remedy="correct the row",
         )

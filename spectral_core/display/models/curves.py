@@ -16,6 +16,8 @@ NODES = 1025
 # Interpolation runs on values to this power, where display curves are nearly straight.
 _COMPRESSION = 1 / 2.4
 _SMALLEST_STEP = 1e-9
+# A curve of a file: a flatter one has no inverse in numbers, and full drive is about 1.
+_LEAST_RISE, _LARGEST_DRIVE = 1e-12, 100.0
 # Places of the table that an inverse starts from: finer than the nodes where a display's curve is steepest.
 _GUESSES = 8192
 _LENGTHS = (0.03, 0.06, 0.12, 0.25, 0.5)
@@ -38,8 +40,10 @@ class ToneCurve:
         values = frozen(self.values)
         if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all() or values[0] != 0:
             raise DisplayError("a tone curve must be a list of finite numbers from 0", remedy="correct the profile")
-        if not (np.diff(values) > 0).all():
+        if not (np.diff(values) > _LEAST_RISE).all():
             raise DisplayError("a tone curve must rise", remedy="correct the profile")
+        if values[-1] > _LARGEST_DRIVE:
+            raise DisplayError("a tone curve must end near 1", remedy="correct the profile")
         object.__setattr__(self, "values", values)
 
     def forward(self, codes: FloatArray) -> Float64Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array
 from spectral_core.display.measuring.measurements import Measurements
-from spectral_core.display.models import DisplayModel, GammaMatrix
+from spectral_core.display.models import GAMMA_RANGE, DisplayModel, GammaMatrix
 from spectral_core.display.models.corrected import fit_correction
 from spectral_core.display.models.curves import fit_curve
 from spectral_core.display.models.tone_models import GainOffsetGamma, LutMatrix
@@ -84,7 +84,7 @@ def _gain_offset_gamma(measured: Measurements) -> DisplayModel:
         fits = []
         for threshold in np.linspace(-0.2, 0.2, 81):
             scaled = np.maximum((codes - threshold) / (1 - threshold), 0.0)
-            gamma, _ = gamma_fit(scaled, drive)
+            gamma = float(np.clip(gamma_fit(scaled, drive)[0], *GAMMA_RANGE))
             fits.append((float(((drive - scaled**gamma) ** 2).sum()), gamma, float(threshold)))
         _, gammas[index], thresholds[index] = min(fits)
     return GainOffsetGamma(gammas, thresholds, primaries(measured, black), black)

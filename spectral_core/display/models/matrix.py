@@ -16,8 +16,10 @@ from spectral_core.arrays import Float64Array, FloatArray, frozen
 from spectral_core.errors import DisplayError
 
 # No display comes near these; beyond them codes overflow instead of being out of gamut.
-_GAMMA = (0.1, 10.0)
+GAMMA_RANGE = (0.1, 10.0)
 _LARGEST_XYZ = 100.0
+# Of white: no instrument tells less from no light, and a contrast to it is no number to be told.
+LEAST_LIGHT = 1e-12
 
 
 class DisplayModel(Protocol):
@@ -57,6 +59,14 @@ def srgb_decode(codes: FloatArray) -> Float64Array:
     magnitude = np.abs(codes)
     curve = ((magnitude + 0.055) / 1.055) ** 2.4
     return np.asarray(np.sign(codes) * np.where(magnitude <= 0.04045, magnitude / 12.92, curve))
+
+
+def check_gamma(gamma: Float64Array) -> None:
+    """Refuse gammas (3,) that no display has."""
+    if not ((gamma >= GAMMA_RANGE[0]) & (gamma <= GAMMA_RANGE[1])).all():
+        raise DisplayError(
+            f"'gamma' must be from {GAMMA_RANGE[0]:g} to {GAMMA_RANGE[1]:g}", remedy="correct the profile"
+        )
 
 
 def checked_vector(name: str, values: Float64Array) -> Float64Array:
@@ -105,8 +115,7 @@ class GammaMatrix:
         object.__setattr__(self, "gamma", checked_vector("gamma", self.gamma))
         object.__setattr__(self, "matrix", checked_matrix(self.matrix))
         object.__setattr__(self, "black_XYZ", checked_vector("black_XYZ", self.black_XYZ))
-        if not ((self.gamma >= _GAMMA[0]) & (self.gamma <= _GAMMA[1])).all():
-            raise DisplayError(f"'gamma' must be from {_GAMMA[0]:g} to {_GAMMA[1]:g}", remedy="correct the profile")
+        check_gamma(self.gamma)
 
     def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3) of device codes (..., 3)."""

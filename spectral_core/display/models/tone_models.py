@@ -7,9 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from spectral_core.arrays import Float64Array, FloatArray, in_blocks
-from spectral_core.display.models import checked_matrix, checked_vector, signed_power
+from spectral_core.display.models import check_gamma, checked_matrix, checked_vector, signed_power
 from spectral_core.display.models.curves import ToneCurve
 from spectral_core.errors import DisplayError
+
+# Near 1 the rest of the curve has no codes.
+_LARGEST_THRESHOLD = 0.99
 
 
 @dataclass(frozen=True)
@@ -104,8 +107,9 @@ class GainOffsetGamma:
         object.__setattr__(self, "matrix", checked_matrix(self.matrix))
         for name in ("gamma", "threshold", "black_XYZ"):
             object.__setattr__(self, name, checked_vector(name, getattr(self, name)))
-        if (self.gamma <= 0).any() or (self.threshold >= 1).any():
-            raise DisplayError("'gamma' must be above 0 and 'threshold' below 1", remedy="correct the profile")
+        check_gamma(self.gamma)
+        if (self.threshold > _LARGEST_THRESHOLD).any():
+            raise DisplayError(f"'threshold' must be at most {_LARGEST_THRESHOLD}", remedy="correct the profile")
 
     def forward(self, codes: FloatArray) -> Float64Array:
         """XYZ (..., 3) of device codes (..., 3)."""
