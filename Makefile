@@ -41,6 +41,7 @@ app: $(VENV)/ready
 
 benchmarks: $(VENV)/ready
 	$(VENV)/bin/python benchmarks/weighting_factors.py
+	$(VENV)/bin/python benchmarks/display_speed.py
 
 system-libraries:
 	sh tools/system_libraries.sh

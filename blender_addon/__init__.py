@@ -23,6 +23,6 @@ def unregister() -> None:
 def _parts() -> tuple[ModuleType, ...]:
     # Imported here because `python -m blender_addon.command` imports this package first, and must
     # then find `command` not imported yet.
-    from . import command, handlers, operators, props, ui
+    from . import command, eyes, handlers, operators, props, ui
 
-    return (props, operators, ui, handlers, command)
+    return (props, operators, ui, handlers, eyes, command)

@@ -28,6 +28,9 @@ class SpectralBoothScene(bpy.types.PropertyGroup):
     level: bpy.props.EnumProperty(name="Level", items=LEVEL_ITEMS, default="2")  # type: ignore[valid-type]
     notes: bpy.props.StringProperty(name="Notes")  # type: ignore[valid-type]
     result: bpy.props.StringProperty(name="Last result")  # type: ignore[valid-type]
+    display_left: bpy.props.StringProperty(name="Display, left or both eyes")  # type: ignore[valid-type]
+    display_right: bpy.props.StringProperty(name="Display, right eye")  # type: ignore[valid-type]
+    display_notes: bpy.props.StringProperty(name="Display notes")  # type: ignore[valid-type]
 
     @property
     def is_managed(self) -> bool:

@@ -78,30 +78,21 @@ def verify_display(
     for light in lights:
         resolve_light(light, description.folder)  # refuse a wrong name before the first render
     progress(0.0, "what the camera sees")
-    before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
-    view = verify.survey(scene)
     results = []
-    try:
-        with shown_on(scene, display):
-            for index, light in enumerate(lights):
-                progress((index + 0.5) / (len(lights) + 0.5), f"{light} through {display.name}")
-                applied = lighting.apply(scene, light, 2)
-                linear = render_linear(scene).pixels
-                readings = verify.read_patches(scene, applied.lighting, linear, view)
-                codes = _codes(scene)
-                patches = [
-                    ShownPatch(
-                        reading.name,
-                        linear[mask].astype(np.float64),
-                        codes[mask].astype(np.float64),
-                        reading.exact * reading.irradiance,
-                    )
-                    for reading in readings
-                    for mask in (view.identity.masks[reading.name],)
-                ]
-                results.append(compare_shown(light, patches, profile))
-    finally:
-        lighting.apply(scene, *before)
+    with verify.as_found(scene), shown_on(scene, display):
+        view = verify.survey(scene)
+        for index, light in enumerate(lights):
+            progress((index + 0.5) / (len(lights) + 0.5), f"{light} through {display.name}")
+            applied = lighting.apply(scene, light, 2)
+            linear = render_linear(scene).pixels
+            readings = verify.read_patches(scene, applied.lighting, linear, view)
+            codes = _codes(scene)
+            patches = []
+            for reading in readings:
+                mask = view.identity.masks[reading.name]
+                pixels = linear[mask].astype(np.float64), codes[mask].astype(np.float64)
+                patches.append(ShownPatch(reading.name, *pixels, reading.exact * reading.irradiance))
+            results.append(compare_shown(light, patches, profile))
     return results
 
 

@@ -32,7 +32,7 @@ def display_group(profile: DisplayProfile, name: str) -> bpy.types.NodeTree:
     tree[GROUP_KEY] = profile.name
     tree.interface.new_socket("XYZ", in_out="INPUT", socket_type="NodeSocketVector")
     tree.interface.new_socket("Emission", in_out="OUTPUT", socket_type="NodeSocketColor")
-    build = _Builder(tree)
+    build = Builder(tree)
     codes = _codes(build, build.input, stages(profile.model), name)
     build.finish(build.combine([_srgb_decode(build, code) for code in codes]))
     return tree
@@ -47,7 +47,7 @@ def remove_group(tree: bpy.types.NodeTree) -> None:
             bpy.data.images.remove(image)
 
 
-class _Builder:
+class Builder:
     """Adds nodes to a tree, left to right."""
 
     def __init__(self, tree: bpy.types.NodeTree) -> None:
@@ -108,6 +108,19 @@ class _Builder:
             for before, after in zip(low, high, strict=True)
         ]
 
+    def group(self, tree: bpy.types.NodeTree, value: Socket) -> Socket:
+        """The result of another group for one value."""
+        node = self._node("ShaderNodeGroup")
+        node.node_tree = tree
+        self._put(node.inputs[0], value)
+        return node.outputs[0]
+
+    def attribute(self, name: str) -> Socket:
+        """A number among the scene's custom properties."""
+        node = self._node("ShaderNodeAttribute")
+        node.attribute_type, node.attribute_name = "VIEW_LAYER", name
+        return node.outputs["Fac"]
+
     def clamp(self, value: Socket) -> Socket:
         """A number within 0..1."""
         return self.math("MINIMUM", self.math("MAXIMUM", value, 0.0), 1.0)
@@ -133,7 +146,7 @@ class _Builder:
             socket.default_value = float(value)
 
 
-def _codes(build: _Builder, XYZ: Socket, steps: Stages, name: str) -> list[Socket]:
+def _codes(build: Builder, XYZ: Socket, steps: Stages, name: str) -> list[Socket]:
     drive = [
         build.math("ADD", build.dot(XYZ, row), offset) for row, offset in zip(steps.matrix, steps.offset, strict=True)
     ]
@@ -151,14 +164,14 @@ def _codes(build: _Builder, XYZ: Socket, steps: Stages, name: str) -> list[Socke
     return [_srgb_encode(build, each) for each in drive]
 
 
-def _lightness(build: _Builder, drive: Socket) -> Socket:
+def _lightness(build: Builder, drive: Socket) -> Socket:
     """CIE 1976 lightness; its line goes on below zero."""
     root = build.math("POWER", build.math("MAXIMUM", drive, TOE), 1 / 3)
     line = build.math("SUBTRACT", build.math("MINIMUM", drive, TOE), TOE)
     return build.math("MULTIPLY_ADD", line, TOE_SLOPE, build.math("MULTIPLY_ADD", root, 1.16, -0.16))
 
 
-def _interaction(build: _Builder, lightness: list[Socket], interaction: Interaction, name: str) -> list[Socket]:
+def _interaction(build: Builder, lightness: list[Socket], interaction: Interaction, name: str) -> list[Socket]:
     """The 3-D table, trilinear, its layers of blue one above the other in an image."""
     n = TABLE_NODES
     low, high = interaction.span
@@ -183,7 +196,7 @@ def _interaction(build: _Builder, lightness: list[Socket], interaction: Interact
     return build.mix(rests[2], *layers)
 
 
-def _tables(build: _Builder, drive: list[Socket], curve: Tables, name: str) -> list[Socket]:
+def _tables(build: Builder, drive: list[Socket], curve: Tables, name: str) -> list[Socket]:
     side = _CURVE_SIDE
     image = _image(f"{name} curves", curve.sampled(side**2).reshape(side, side, 3))
     codes = []
@@ -195,13 +208,13 @@ def _tables(build: _Builder, drive: list[Socket], curve: Tables, name: str) -> l
     return codes
 
 
-def _srgb_decode(build: _Builder, code: Socket) -> Socket:
+def _srgb_decode(build: Builder, code: Socket) -> Socket:
     """IEC 61966-2-1, for codes from 0."""
     curve = build.math("POWER", build.math("MULTIPLY_ADD", code, 1 / 1.055, 0.055 / 1.055), 2.4)
     return build.choose(build.math("GREATER_THAN", code, 0.04045), curve, build.math("MULTIPLY", code, 1 / 12.92))
 
 
-def _srgb_encode(build: _Builder, linear: Socket) -> Socket:
+def _srgb_encode(build: Builder, linear: Socket) -> Socket:
     """IEC 61966-2-1, for values from 0."""
     curve = build.math("MULTIPLY_ADD", build.math("POWER", linear, 1 / 2.4), 1.055, -0.055)
     line = build.math("MULTIPLY", linear, 12.92)

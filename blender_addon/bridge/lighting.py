@@ -13,7 +13,7 @@ from spectral_core.lights import Light
 from spectral_core.scene import SceneDescription, resolve_light
 from spectral_core.surfaces import scene_surfaces
 
-from . import materials, measure, state
+from . import headset, materials, measure, state
 
 
 @dataclass(frozen=True)
@@ -74,11 +74,12 @@ def calibrate_white(scene: bpy.types.Scene) -> Calibrated:
         raise BlenderError(
             f"the camera does not see the white target '{white.name}'", remedy="move the camera or the target"
         )
-    before = _white_luminance(scene, description, white, mask)
-    factor = description.white.luminance / before
-    for lamp in state.managed_lamps(scene):
-        lamp.data.energy *= factor
-    return Calibrated(before, _white_luminance(scene, description, white, mask), factor)
+    with headset.scene_linear(scene):
+        before = _white_luminance(scene, description, white, mask)
+        factor = description.white.luminance / before
+        for lamp in state.managed_lamps(scene):
+            lamp.data.energy *= factor
+        return Calibrated(before, _white_luminance(scene, description, white, mask), factor)
 
 
 def _white_luminance(

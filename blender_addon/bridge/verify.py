@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -33,7 +34,7 @@ from spectral_core.verification import (
     worst_stages,
 )
 
-from . import lighting, materials, measure, state
+from . import headset, lighting, materials, measure, state
 from .render import render_linear
 
 # Fewer pixels than this are no reading: 5 x 5 inside the border.
@@ -109,11 +110,10 @@ def verify_steps(
     description = state.description(scene)
     for light in lights:
         resolve_light(light, description.folder)  # refuse a wrong name before the first render
-    yield Step(0.0, "what the camera sees")
-    before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
-    view = survey(scene)
-    results = []
-    try:
+    with as_found(scene):
+        yield Step(0.0, "what the camera sees")
+        view = survey(scene)
+        results = []
         for index, light in enumerate(lights):
             found: dict[int, LevelResult] = {}
             textures: dict[str, TextureDifference] = {}
@@ -133,9 +133,18 @@ def verify_steps(
                     met = conditions(applied.lighting, applied.clipped, applied.extended)
                     textures = _read_textures(scene, applied.lighting, diffuse, view)
             results.append(LightResult(light, found, textures, met))
-    finally:
-        lighting.apply(scene, *before)
-    return results
+        return results
+
+
+@contextmanager
+def as_found(scene: bpy.types.Scene) -> Iterator[None]:
+    """The scene's own colours for the block, not a headset's codes; its light and level put back afterwards."""
+    before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
+    with headset.scene_linear(scene):
+        try:
+            yield
+        finally:
+            lighting.apply(scene, *before)
 
 
 def summary(results: Sequence[LightResult]) -> str:

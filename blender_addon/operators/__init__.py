@@ -5,6 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .build import BuildScene
+from .display import ClearDisplay, SetDisplay
 from .light import CalibrateWhite, SetLevel, SetLight
 from .patches import PlayPatches
 from .render import RenderScene
@@ -17,6 +18,8 @@ _classes = (
     CalibrateWhite,
     RenderScene,
     VerifyScene,
+    SetDisplay,
+    ClearDisplay,
     PlayPatches,
 )
 

@@ -76,7 +76,15 @@ class DisplayPanel(bpy.types.Panel):
     bl_parent_id = ScenePanel.bl_idname
 
     def draw(self, context: bpy.types.Context) -> None:
-        """The player's button, and what it shows while it plays."""
+        """The headset's profile, the player's button, and what it shows while it plays."""
+        state = context.scene.spectral_booth
+        if state.is_managed:
+            row = self.layout.row(align=True)
+            row.operator_context = "INVOKE_DEFAULT"
+            row.operator("spectral_booth.set_display", text="Headset Profile…", icon="VIEW_CAMERA").left = ""
+            if state.display_left:
+                row.operator("spectral_booth.clear_display", text="", icon="X")
+                _draw_lines(self.layout.box(), context, state.display_notes.split("; "), "INFO")
         playing = context.window_manager.spectral_booth_player
         row = self.layout.row()
         row.enabled = not playing

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -11,6 +13,11 @@ import numpy as np
 import pytest
 
 import blender_addon
+from spectral_core.arrays import frozen
+from spectral_core.display import DisplayProfile
+
+sys.path.append(str(Path(__file__).parents[1] / "core"))
+import displays
 
 FAILED = Path("out") / "failed"
 
@@ -97,3 +104,20 @@ def textured(textured_toml: Path) -> bpy.types.Scene:
     """The scene with the texture, not calibrated."""
     assert bpy.ops.spectral_booth.build(filepath=str(textured_toml), calibrate=False) == {"FINISHED"}
     return bpy.context.scene
+
+
+@pytest.fixture(scope="session")
+def simulated_profile() -> Callable[[str], DisplayProfile]:
+    """A profile of a kind of model, fitted to a simulated headset; any other name is a built-in one."""
+    from spectral_core.display import load_profile
+    from spectral_core.display.models.fitting import MODEL_KINDS
+
+    def profile(name: str) -> DisplayProfile:
+        kinds = {kind.name: kind for kind in MODEL_KINDS}
+        if name not in kinds:
+            return load_profile(name)
+        measured = displays.measure(displays.power_limited, displays.published_protocol(), seed=1)
+        measured = replace(measured, XYZ=frozen(measured.XYZ / measured.white_XYZ[1]))
+        return DisplayProfile(name, kinds[name].fit(measured))
+
+    return profile

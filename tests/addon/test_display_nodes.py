@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
-from dataclasses import replace
-from pathlib import Path
+from collections.abc import Callable
 
 import bpy
 import numpy as np
@@ -12,24 +10,11 @@ import pytest
 
 from blender_addon.bridge.display_nodes import display_group, remove_group
 from blender_addon.bridge.render import render_linear
-from spectral_core.arrays import frozen
 from spectral_core.display import DisplayProfile, load_profile, srgb_decode, srgb_encode
-from spectral_core.display.models.fitting import MODEL_KINDS
 from spectral_core.standards import XYZ_to_Lab, delta_E_2000
 
-sys.path.append(str(Path(__file__).parents[1] / "core"))
-import displays
-
+Simulated = Callable[[str], DisplayProfile]
 _SIZE = 32
-
-
-def _profile(name: str) -> DisplayProfile:
-    kinds = {kind.name: kind for kind in MODEL_KINDS}
-    if name not in kinds:
-        return load_profile(name)
-    measured = displays.measure(displays.power_limited, displays.published_protocol(), seed=1)
-    measured = replace(measured, XYZ=frozen(measured.XYZ / measured.white_XYZ[1]))
-    return DisplayProfile(name, kinds[name].fit(measured))
 
 
 def _emitted(profile: DisplayProfile, XYZ: np.ndarray) -> np.ndarray:
@@ -82,8 +67,8 @@ def _emitted(profile: DisplayProfile, XYZ: np.ndarray) -> np.ndarray:
         ("grey-lut", 5e-4),
     ],
 )
-def test_the_group_emits_the_codes(name: str, limit: float) -> None:
-    profile = _profile(name)
+def test_the_group_emits_the_codes(simulated_profile: Simulated, name: str, limit: float) -> None:
+    profile = simulated_profile(name)
     codes = np.random.default_rng(0).uniform(0.02, 0.98, (_SIZE * _SIZE, 3))
     XYZ = profile.to_XYZ(codes)
     emitted = _emitted(profile, XYZ)
@@ -94,11 +79,11 @@ def test_the_group_emits_the_codes(name: str, limit: float) -> None:
     assert difference.max() < limit
 
 
-def test_a_table_of_interacting_channels() -> None:
+def test_a_table_of_interacting_channels(simulated_profile: Simulated) -> None:
     """65 nodes of an inverse that has edges: in the dark, where a code is little light, some levels, but
     nothing that is seen.
     """
-    profile = _profile("channel-lut-corrected")
+    profile = simulated_profile("channel-lut-corrected")
     XYZ = profile.to_XYZ(np.random.default_rng(0).uniform(0.02, 0.98, (_SIZE * _SIZE, 3)))
     codes = srgb_encode(_emitted(profile, XYZ))
     difference = 255 * np.abs(codes - profile.to_codes(XYZ))
@@ -118,9 +103,9 @@ def test_out_of_gamut_is_clipped_and_black_is_black() -> None:
     np.testing.assert_allclose(_emitted(profile, XYZ), wanted, atol=1e-4)
 
 
-def test_a_group_goes_away_with_its_tables() -> None:
+def test_a_group_goes_away_with_its_tables(simulated_profile: Simulated) -> None:
     before = len(bpy.data.images)
-    tree = display_group(_profile("channel-lut-corrected"), "display")
+    tree = display_group(simulated_profile("channel-lut-corrected"), "display")
     assert len(bpy.data.images) == before + 2
     remove_group(tree)
     assert len(bpy.data.images) == before

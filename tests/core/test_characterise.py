@@ -127,6 +127,21 @@ def test_one_bad_patch_is_found_and_named() -> None:
     assert found.chosen.held_out.mean == pytest.approx(clean.chosen.held_out.mean, rel=0.1)
 
 
+@pytest.mark.parametrize("ramp", [0, 1, 2, 3])
+@pytest.mark.parametrize("factor", [0.5, 1.5])
+def test_one_bad_reading_in_a_ramp_does_little(ramp: int, factor: float) -> None:
+    """Off by half: the bound of a clean set still holds, and the patch is named."""
+    good = displays.measure(displays.power_limited, displays.published_protocol(1), seed=1)
+    chosen = np.flatnonzero(good.grey if ramp == 3 else good.channel(ramp))
+    XYZ = good.XYZ.copy()
+    XYZ[chosen[len(chosen) // 2]] *= factor
+    found = characterise(replace(good, XYZ=frozen(XYZ)))
+    truth = unseen(displays.power_limited, good.white_XYZ[1])
+    white = displays.power_limited(np.ones((1, 3)))[0] / good.white_XYZ[1]
+    assert errors(found.chosen.model, truth, white).mean() <= 0.5
+    assert any("ramp falls" in each for each in found.warnings)
+
+
 def test_four_colours_get_what_they_can_support(tmp_path: Path) -> None:
     path = tmp_path / "small.csv"
     path.write_text("\ufeffColor,L,x,y\nRed,30,0.65,0.33\nGreen,85,0.24,0.70\nBlue,8,0.14,0.05\nWhite,110,0.30,0.32\n")

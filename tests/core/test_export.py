@@ -228,12 +228,30 @@ def test_both_eyes_in_one_config(tmp_path: Path, fitted: dict[str, DisplayProfil
 def test_a_new_profile_of_the_same_name_replaces_the_old(tmp_path: Path, fitted: dict[str, DisplayProfile]) -> None:
     """OpenColorIO never reads a file twice: the new table has a new name, the old one goes."""
     base = write_base(tmp_path)
-    for name in ("grey-lut-corrected", "channel-lut"):
+    for name, config in (("grey-lut-corrected", base), ("channel-lut", tmp_path / "out/config.ocio")):
         profile = replace(fitted[name], name="headset")
-        read = read_back_ocio(profile, export_ocio(profile, tmp_path / "out", base))
+        exported = export_ocio(profile, tmp_path / "out", config)
+        read = read_back_ocio(profile, exported)
         assert read.max_dE00 is not None
         assert read.max_dE00 < 0.5
+        assert {path for path in (tmp_path / "out").rglob("*") if path.is_file()} == set(exported.files)
     assert len(list((tmp_path / "out/luts").iterdir())) == 2
+
+
+def test_exporting_again_replaces_the_display(tmp_path: Path, fitted: dict[str, DisplayProfile]) -> None:
+    """Also onto a config that has it, and beside another; a name that Blender has stays told apart."""
+    others = [replace(load_profile("htc-vive-2020"), name=name) for name in ("sRGB", "other", "last")]
+    config = write_base(tmp_path)
+    for each in others:
+        config = export_ocio(each, tmp_path / "out", config).config
+    once = config.read_text()
+    assert 'active_displays: [sRGB, "sRGB (profile)", "other", "last"]' in once
+    for each in others:
+        again = export_ocio(each, tmp_path / "out", config)
+        read = read_back_ocio(each, again)
+        assert read.max_dE00 is not None, read.why
+        assert read.max_dE00 < 0.003
+    assert config.read_text() == once
 
 
 def test_taken_names_are_left_to_blender(base: Path, tmp_path: Path) -> None:

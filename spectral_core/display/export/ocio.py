@@ -31,6 +31,7 @@ from spectral_core.files import atomic_path, is_file, read_text
 VIEW = "Standard"
 _MARK = "# Made by Spectral Booth from"
 _REMEDY = "give Blender's own config.ocio (in its folder datafiles/colormanagement)"
+_SUFFIX = " (profile)"
 _CURVE_NODES = 4096
 # Twice the nodes a side halve the error and take eight times the memory of a graphics card: 3.3 MB here.
 _TABLE_NODES = 65
@@ -68,6 +69,8 @@ def blender_config() -> Path:
 def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport:
     """Write a self-contained copy of the config `base` to `folder`, with the profile as one more display.
 
+    An earlier export under the same name is replaced; a name of Blender's own gets a suffix.
+
     Raises
     ------
     DisplayError
@@ -79,19 +82,31 @@ def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport
     config = folder / "config.ocio"
     _refuse_foreign(folder, config)
     paths = _search_path(text, base)
-    display = _free_name(export_name(profile), text)
+    display = export_name(profile)
+    text = _without(text, display)
+    while display.casefold() in _names(text):
+        display += _SUFFIX
+        text = _without(text, display)
     tables, transforms = _transforms(stages(profile.model), display)
     edited = _with_display(text, base, display, transforms)
 
     own = folder / ("luts" if "luts" in paths else paths[0])
-    files = [_copied(source, folder / path / source.name) for path in paths for source in _files(base.parent / path)]
-    files += [_table(own / name, values) for name, values in tables.items()]
+    files = [_table(own / name, values) for name, values in tables.items()]
+    for source in (source for path in paths for source in _files(base.parent / path)):
+        target = folder / source.relative_to(base.parent)
+        if target not in files and not _is_left_over(source, edited):
+            files.append(_copied(source, target))
     with atomic_path(config) as temporary:
         temporary.write_text(edited, encoding="utf-8")
     for path in _files(own):
-        if _OWN_TABLE.fullmatch(path.name) and path.name not in edited:
+        if _is_left_over(path, edited):
             path.unlink()
     return OcioExport(config, display, VIEW, (config, *files))
+
+
+def _is_left_over(path: Path, text: str) -> bool:
+    """Whether a table of an earlier export is used no more."""
+    return _OWN_TABLE.fullmatch(path.name) is not None and path.name not in text
 
 
 def _refuse_foreign(folder: Path, config: Path) -> None:
@@ -123,13 +138,21 @@ def _copied(source: Path, target: Path) -> Path:
     return target
 
 
-def _free_name(wanted: str, text: str) -> str:
-    """The name, told apart from every display, colour space, alias and role that the config has."""
-    taken = {word.strip(" \"'").casefold() for word in re.split(r"[,:\[\]\n{}]", text)}
-    name = wanted
-    while name.casefold() in taken:
-        name += " (profile)"
-    return name
+def _names(text: str) -> set[str]:
+    """Every display, colour space, alias and role that the config has, and more words."""
+    return {word.strip(" \"'").casefold() for word in re.split(r"[,:\[\]\n{}]", text)}
+
+
+def _without(text: str, display: str) -> str:
+    """The config without a display that an earlier export put there."""
+    begin, end = _bounds(display)
+    bare = re.sub(f"^{re.escape(begin)}\n.*?^{re.escape(end)}\n", "", text, flags=re.MULTILINE | re.DOTALL)
+    return text if bare == text else bare.replace(f", {_quoted(display)}]", "]").replace(f", {_quoted(display)},", ",")
+
+
+def _bounds(display: str) -> tuple[str, str]:
+    """Comments around what an export puts into a config."""
+    return f"  # Spectral Booth: {display}", f"  # Spectral Booth: end of {display}"
 
 
 def _transforms(steps: Stages, name: str) -> tuple[dict[str, Float64Array], list[str]]:
@@ -201,8 +224,10 @@ def _with_display(text: str, base: Path, display: str, transforms: list[str]) ->
         if not re.search(rf"^  {role}:", text, re.MULTILINE):
             raise DisplayError(f"has no role '{role}'", where=base, remedy=_REMEDY)
     views = [f"{{name: {VIEW}, colorspace: {_quoted(display)}}}", "{name: Raw, colorspace: Non-Color}"]
-    shown = [f"  {_quoted(display)}:", *(f"    - !<View> {view}" for view in views)]
+    begin, end = _bounds(display)
+    shown = [begin, f"  {_quoted(display)}:", *(f"    - !<View> {view}" for view in views), end]
     space = [
+        begin,
         "  - !<ColorSpace>",
         f"    name: {_quoted(display)}",
         "    family: Display",
@@ -213,7 +238,7 @@ def _with_display(text: str, base: Path, display: str, transforms: list[str]) ->
         "      children:",
         "        - !<ColorSpaceTransform> {src: reference, dst: cie_xyz_d65_interchange}",
         *(f"        - {transform}" for transform in transforms),
-        "",
+        end,
     ]
     lines = _inserted(text.splitlines(), base, "displays", shown, at_end=True)
     lines = _inserted(lines, base, "colorspaces", space, at_end=False)

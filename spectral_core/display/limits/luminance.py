@@ -281,3 +281,16 @@ def _warnings(profile: DisplayProfile, shown: float, black: BlackLimit) -> tuple
     if black.scene_Y == 0:
         warnings.append("the profile has no light in black: what a real black does to dark colours is not told")
     return tuple(warnings)
+
+
+def eye_scene_whites(left: DisplayProfile, right: DisplayProfile) -> tuple[float, float]:
+    """The scene white of each eye: of both, the same luminance in cd/m2 where both profiles know theirs.
+
+    The brighter eye is dimmed to the other. Without luminances each eye keeps its own `scene_white`.
+    """
+    own = scene_white(left), scene_white(right)
+    whites = left.white_luminance_cd_m2, right.white_luminance_cd_m2
+    if whites[0] is None or whites[1] is None:
+        return own
+    shown = min(own[0] * whites[0], own[1] * whites[1])
+    return shown / whites[0], shown / whites[1]
