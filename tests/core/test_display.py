@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spectral_core.display import builtin_profile_names, load_profile, read_profile, write_profile
@@ -15,6 +15,7 @@ rgb = st.lists(st.floats(-2, 2), min_size=3, max_size=3)
 
 
 @pytest.mark.parametrize("name", builtin_profile_names())
+@settings(deadline=None)  # the first example loads colour-science
 @given(codes=rgb)
 def test_inverse_undoes_forward_for_all_codes(name: str, codes: list[float]) -> None:
     """Outside 0..1 too: nothing is clipped. Near black the power amplifies rounding: compare in XYZ.
