@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .build import BuildScene
-from .display import ClearDisplay, SetDisplay
+from .display import AddDisplayGroup, ClearDisplay, SetDisplay
 from .light import CalibrateWhite, SetLevel, SetLight
 from .patches import PlayPatches
 from .render import RenderScene
@@ -20,6 +20,7 @@ _classes = (
     VerifyScene,
     SetDisplay,
     ClearDisplay,
+    AddDisplayGroup,
     PlayPatches,
 )
 

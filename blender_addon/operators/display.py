@@ -39,6 +39,37 @@ class SetDisplay(ManagedScene, bpy.types.Operator):
         return outcome.status
 
 
+class AddDisplayGroup(bpy.types.Operator):
+    """Add a profile's node group, XYZ in and emission for the headset out, to use in materials of your own"""
+
+    bl_idname = "spectral_booth.add_display_group"
+    bl_label = "Add Display Node Group"
+    bl_options = {"REGISTER", "UNDO"}
+
+    profile: bpy.props.StringProperty(  # type: ignore[valid-type]
+        name="Profile", description="A profile's JSON, or htc-vive-2020, htc-vive-2021, sRGB", subtype="FILE_PATH"
+    )
+
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """Ask for the profile if none was given."""
+        if self.profile:
+            return self.execute(context)
+        return context.window_manager.invoke_props_dialog(self, width=360, confirm_text="Add")
+
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        """Make the group; it is kept in the file although nothing uses it yet."""
+        with reported(self) as outcome:
+            from spectral_core.display import load_profile
+
+            from ..bridge.display_nodes import display_group
+
+            profile = load_profile(bpy.path.abspath(self.profile))
+            tree = display_group(profile, f"Display {profile.name}")
+            tree.use_fake_user = True
+            self.report({"INFO"}, f"Node group '{tree.name}' added: Shader Editor, Add, Group")
+        return outcome.status
+
+
 class ClearDisplay(ManagedScene, bpy.types.Operator):
     """Show the scene's own colours again, as windows and renders need them"""
 

@@ -84,3 +84,10 @@ def test_what_cannot_be_shown_is_told(chart: bpy.types.Scene) -> None:
         bpy.ops.spectral_booth.set_display(left="nowhere.json")
     assert chart.spectral_booth.display_left == ""
     assert not bpy.data.node_groups
+
+
+def test_a_group_for_materials_of_ones_own() -> None:
+    assert bpy.ops.spectral_booth.add_display_group(profile="htc-vive-2021") == {"FINISHED"}
+    tree = bpy.data.node_groups["Display htc-vive-2021"]
+    assert [each.name for each in tree.interface.items_tree] == ["Emission", "XYZ"]
+    assert tree.use_fake_user
