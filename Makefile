@@ -20,7 +20,7 @@ lint: $(VENV)/ready
 core: $(VENV)/ready
 	$(VENV)/bin/python $(PYTEST) tests/core tests/reference
 
-# numpy 2.x and no bpy at all.
+# numpy 2.x and no bpy at all; LittleCMS in floats, as another reader of ICC profiles.
 core-numpy2: .venv-numpy2/ready
 	.venv-numpy2/bin/python $(PYTEST) tests/core tests/reference
 
@@ -50,7 +50,7 @@ $(VENV)/ready: pyproject.toml | system-libraries
 	$(PYTHON) tools/make_environment.py $(VENV) '.[all,dev]'
 
 .venv-numpy2/ready: pyproject.toml | system-libraries
-	$(PYTHON) tools/make_environment.py .venv-numpy2 '.[report,dev]' 'numpy>=2'
+	$(PYTHON) tools/make_environment.py .venv-numpy2 '.[report,dev]' 'numpy>=2' imagecodecs
 
 # colour-science 0.4.7 without scipy on numpy 1.26: what the extension brings inside Blender 4.5 and 5.0.
 .venv-bpy45/ready: pyproject.toml | system-libraries
