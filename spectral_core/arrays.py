@@ -25,10 +25,11 @@ def frozen(values: npt.ArrayLike) -> Float64Array:
     return array
 
 
-# Pixels at a time, so that what is in between stays in the processor's cache: three times as fast.
-_BLOCK = 16_384
-# Fewer than these are done before a thread has started.
-_FEWEST_FOR_THREADS = 8 * _BLOCK
+# Pixels at a time: what is in between stays in the processor's cache, and threads are not held up by the
+# interpreter between numpy's calls. A quarter of it takes half as long again.
+_BLOCK = 65_536
+# Fewer than these are done before threads have started.
+_FEWEST_FOR_THREADS = 4 * _BLOCK
 
 
 def in_blocks(function: Callable[[Float64Array], Float64Array], colours: npt.ArrayLike) -> Float64Array:
