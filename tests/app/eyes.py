@@ -5,15 +5,16 @@ A scene under its light goes through a profile per eye, and the headset is photo
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import time
-import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+
+sys.path.append(str(Path(__file__).parent))
+from steps import play, view
 
 PAUSE_S = 1.0
 # In software the headset's first frames take a while: the display's shaders are compiled.
@@ -27,20 +28,20 @@ LEFT, RIGHT = sys.argv[-2:]
 
 def steps(found: dict[str, object]) -> Iterator[None]:
     """What a user does, a step at a time."""
-    view = _view()
-    with bpy.context.temp_override(**view):
+    place = view()
+    with bpy.context.temp_override(**place):
         bpy.ops.spectral_booth.build(filepath=str(SCENE), calibrate=False)
         bpy.ops.spectral_booth.set_display(left=LEFT, right=RIGHT)
     scene = bpy.context.window_manager.windows[0].scene
     found["notes"] = scene.spectral_booth.display_notes
-    space = view["space_data"]
+    space = place["space_data"]
     space.shading.type, space.overlay.show_overlays = "RENDERED", False
     scene.eevee.taa_samples = 1
     settings = bpy.context.window_manager.xr_session_settings
     settings.base_pose_type, settings.base_pose_location = "CUSTOM", scene.camera.location
     settings.show_floor = settings.show_selection = False
     yield
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         bpy.ops.wm.xr_session_toggle()
     ready = time.perf_counter() + WARM_UP_S
     while time.perf_counter() < ready:
@@ -50,38 +51,11 @@ def steps(found: dict[str, object]) -> Iterator[None]:
         subprocess.run(["import", "-window", "root", str(FOLDER / f"eyes{number}.png")], check=True)
         found["heads"].append(list(bpy.context.window_manager.xr_session_state.viewer_pose_location))
         yield
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         bpy.ops.wm.xr_session_toggle()
     yield
 
 
-def _view() -> dict[str, object]:
-    window = bpy.context.window_manager.windows[0]
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
-    region = next(each for each in area.regions if each.type == "WINDOW")
-    return {"window": window, "area": area, "region": region, "space_data": area.spaces.active}
-
-
-def _run() -> float | None:
-    try:
-        if time.perf_counter() - started > LONGEST_S:
-            raise TimeoutError(f"not done after {LONGEST_S} s")
-        next(running)
-    except StopIteration:
-        pass
-    except BaseException:
-        found["exception"] = traceback.format_exc()
-    else:
-        return PAUSE_S
-    RESULT.write_text(json.dumps(found), encoding="utf-8")
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    started = time.perf_counter()
     found: dict[str, object] = {}
-    running = steps(found)
-    bpy.context.preferences.view.show_splash = False
-    bpy.app.timers.register(_run, first_interval=2.0)
+    play(steps(found), found, RESULT, PAUSE_S, LONGEST_S)

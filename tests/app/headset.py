@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import time
-import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+
+sys.path.append(str(Path(__file__).parent))
+from steps import play, view
 
 PAUSE_S = 0.5
 LONGEST_S = 540.0
@@ -26,18 +27,18 @@ RESULT, PATCHES, FOLDER = (Path(each) for each in sys.argv[sys.argv.index("--") 
 
 def steps(found: dict[str, object]) -> Iterator[None]:
     """What a user does, a step at a time."""
-    view = _view()
-    view["space_data"].show_region_ui = True
+    place = view()
+    place["space_data"].show_region_ui = True
     yield  # the sidebar has its categories once it was drawn
-    sidebar = next(each for each in view["area"].regions if each.type == "UI")
+    sidebar = next(each for each in place["area"].regions if each.type == "UI")
     sidebar.active_panel_category = "Spectral Booth"
     bpy.context.window.scene.view_settings.view_transform = "AgX"
     cube = bpy.data.objects["Cube"]
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         bpy.ops.transform.translate("EXEC_DEFAULT", True, value=(1.0, 0.0, 0.0))
     yield
     found["before"] = _state()
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         found["played"] = sorted(
             bpy.ops.spectral_booth.play_patches(
                 "INVOKE_DEFAULT", filepath=str(PATCHES), folder=str(FOLDER), advance="FILE",
@@ -46,25 +47,25 @@ def steps(found: dict[str, object]) -> Iterator[None]:
         )  # fmt: skip
     instrument = subprocess.Popen([sys.executable, str(Path(__file__).with_name("instrument.py")), str(FOLDER)])
     found["playing"] = []
-    region = view["region"]
-    found["middle"] = [region.x + region.width // 2, view["window"].height - region.y - region.height // 2]
+    region = place["region"]
+    found["middle"] = [region.x + region.width // 2, place["window"].height - region.y - region.height // 2]
     while instrument.poll() is None:
         found["playing"].append(_playing())
         yield
     found["instrument"] = instrument.returncode
     yield
     found["after"] = _state()
-    yield from _keys(found, view)
+    yield from _keys(found, place)
     found["cube"] = cube.location.x
-    with bpy.context.temp_override(**_view()):
+    with bpy.context.temp_override(**view()):
         bpy.ops.ed.undo()
     yield
     found["undone"] = bpy.data.objects["Cube"].location.x
 
 
-def _keys(found: dict[str, object], view: dict[str, object]) -> Iterator[None]:
+def _keys(found: dict[str, object], place: dict[str, object]) -> Iterator[None]:
     """Forward, forward, back, and Esc."""
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         bpy.ops.spectral_booth.play_patches(
             "INVOKE_DEFAULT", filepath=str(PATCHES), folder=str(FOLDER / "keys"), settle=0.0, warm_up=0.0
         )
@@ -73,7 +74,7 @@ def _keys(found: dict[str, object], view: dict[str, object]) -> Iterator[None]:
         yield
         indices.append(_document(FOLDER / "keys")["index"])
         for value in ("PRESS", "RELEASE"):
-            view["window"].event_simulate(type=key, value=value, x=400, y=400)
+            place["window"].event_simulate(type=key, value=value, x=400, y=400)
     yield
     found["keys"] = indices
     found["stopped"] = _document(FOLDER / "keys")["state"]
@@ -100,14 +101,14 @@ def _session() -> bool:
 
 def _state() -> dict[str, object]:
     """All that the player might leave changed."""
-    view = _view()
-    space = view["space_data"]
+    place = view()
+    space = place["space_data"]
     settings = bpy.context.window_manager.xr_session_settings
     kinds = ("scenes", "objects", "meshes", "cameras", "materials", "worlds")
     return {
-        "scene": view["window"].scene.name,
+        "scene": place["window"].scene.name,
         "view": [space.shading.type, space.overlay.show_overlays, space.show_gizmo, space.region_3d.view_perspective],
-        "colour": view["window"].scene.view_settings.view_transform,
+        "colour": place["window"].scene.view_settings.view_transform,
         "headset": [settings.show_floor, settings.show_selection, settings.shading.type],
         "session": _session(),
         "data": {kind: sorted(each.name for each in getattr(bpy.data, kind)) for kind in kinds},
@@ -115,34 +116,6 @@ def _state() -> dict[str, object]:
     }
 
 
-def _view() -> dict[str, object]:
-    window = bpy.context.window_manager.windows[0]
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
-    region = next(each for each in area.regions if each.type == "WINDOW")
-    return {"window": window, "area": area, "region": region, "space_data": area.spaces.active}
-
-
-def _run() -> float | None:
-    found["seconds"] = time.perf_counter() - started
-    try:
-        if found["seconds"] > LONGEST_S:
-            raise TimeoutError(f"not done after {LONGEST_S} s")
-        next(running)
-    except StopIteration:
-        pass
-    except BaseException:
-        found["exception"] = traceback.format_exc()
-    else:
-        return PAUSE_S
-    RESULT.write_text(json.dumps(found), encoding="utf-8")
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    started = time.perf_counter()
-    found: dict[str, object] = {"blender": bpy.app.version_string}
-    running = steps(found)
-    bpy.context.preferences.view.show_splash = False
-    bpy.app.timers.register(_run, first_interval=2.0)
+    found: dict[str, object] = {}
+    play(steps(found), found, RESULT, PAUSE_S, LONGEST_S)

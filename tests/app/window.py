@@ -5,17 +5,15 @@ Each step runs from a timer, as a user's clicks would come: Blender draws in bet
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
-import time
-import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
 
 sys.path.append(str(Path(__file__).parent))
+from steps import play, view
 from window_state import state
 
 LIGHTS = ("D50", "A", "two-peaks-d65")
@@ -28,51 +26,51 @@ RESULT, FOLDER = (Path(each) for each in sys.argv[sys.argv.index("--") + 1 :])
 
 def steps(found: dict[str, object]) -> Iterator[None]:
     """What a user does, a step at a time."""
-    view = _view()
-    view["space_data"].show_region_ui = True
+    place = view()
+    place["space_data"].show_region_ui = True
     yield  # the sidebar has its categories once it was drawn
-    sidebar = next(each for each in view["area"].regions if each.type == "UI")
+    sidebar = next(each for each in place["area"].regions if each.type == "UI")
     sidebar.active_panel_category = "Spectral Booth"
     yield
     _photograph(found, "start")
     user = bpy.context.scene
     names = [item.name for item in user.objects]
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         bpy.ops.spectral_booth.build("INVOKE_DEFAULT", preset="booth", calibrate=False)
     scene = bpy.context.window_manager.windows[0].scene
     scene.render.resolution_percentage, scene.eevee.taa_render_samples = 25, 1
     found["scenes"] = [each.name for each in bpy.data.scenes]
     found["user_objects_kept"] = names == [item.name for item in user.objects]
     yield
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         bpy.ops.spectral_booth.calibrate_white()
     yield
     shown = {}
     for light in LIGHTS:
         for level in LEVELS:
-            with bpy.context.temp_override(**view):
+            with bpy.context.temp_override(**place):
                 bpy.ops.spectral_booth.set_light("EXEC_DEFAULT", True, light=light)
                 bpy.ops.spectral_booth.set_level("EXEC_DEFAULT", True, level=level)
             yield
             shown[f"{light} {level}"] = state(scene)
     found["shown"] = shown
-    with bpy.context.temp_override(**view):
+    with bpy.context.temp_override(**place):
         bpy.ops.ed.undo()
     yield
     scene = bpy.data.scenes["Light booth"]
     found["undone"] = state(scene)
-    with bpy.context.temp_override(**_view()):
+    with bpy.context.temp_override(**view()):
         bpy.ops.ed.redo()
     yield
     scene = bpy.data.scenes["Light booth"]
     found["redone"] = state(scene)
-    with bpy.context.temp_override(**_view()):
+    with bpy.context.temp_override(**view()):
         found["verify"] = sorted(bpy.ops.spectral_booth.verify("INVOKE_DEFAULT", lights="CURRENT"))
     while not scene.spectral_booth.result:
         yield
     found["result"] = scene.spectral_booth.result
     # Only now: in software the viewport takes longer to draw than all else together.
-    space = _view()["space_data"]
+    space = view()["space_data"]
     space.shading.type = "RENDERED"
     space.region_3d.view_perspective = "CAMERA"
     space.overlay.show_overlays = False
@@ -83,39 +81,11 @@ def steps(found: dict[str, object]) -> Iterator[None]:
     found["saved"] = state(scene)
 
 
-def _view() -> dict[str, object]:
-    window = bpy.context.window_manager.windows[0]
-    area = next(each for each in window.screen.areas if each.type == "VIEW_3D")
-    region = next(each for each in area.regions if each.type == "WINDOW")
-    return {"window": window, "area": area, "region": region, "space_data": area.spaces.active}
-
-
 def _photograph(found: dict[str, object], name: str) -> None:
     path = FOLDER / f"{name}.png"
     found[name] = subprocess.run(["import", "-window", "root", str(path)], check=False).returncode
 
 
-def _run() -> float | None:
-    found["seconds"] = time.perf_counter() - started
-    try:
-        if found["seconds"] > LONGEST_S:
-            raise TimeoutError(f"not done after {LONGEST_S} s")
-        next(running)
-    except StopIteration:
-        pass
-    except BaseException:
-        found["exception"] = traceback.format_exc()
-    else:
-        return PAUSE_S
-    RESULT.write_text(json.dumps(found), encoding="utf-8")
-    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    started = time.perf_counter()
-    found: dict[str, object] = {"blender": bpy.app.version_string}
-    running = steps(found)
-    bpy.context.preferences.view.show_splash = False
-    bpy.app.timers.register(_run, first_interval=2.0)
+    found: dict[str, object] = {}
+    play(steps(found), found, RESULT, PAUSE_S, LONGEST_S)
