@@ -7,13 +7,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-import displays
 import numpy as np
 import pytest
 
 from spectral_core import standards
-from spectral_core.display import DisplayProfile, builtin_profile_names, load_profile, srgb_decode
-from spectral_core.display.characterising.characterise import characterise
+from spectral_core.display import DisplayProfile, load_profile, srgb_decode
 from spectral_core.display.export import (
     blender_config,
     export_cube,
@@ -27,13 +25,9 @@ from spectral_core.display.export import (
 from spectral_core.display.export.icc import adaptation
 from spectral_core.display.measuring.state import HeadsetState
 from spectral_core.display.models.corrected import CorrectedLut
-from spectral_core.display.models.stages import SRGB, Interaction, Power, Tables, stages
 from spectral_core.errors import DisplayError, OutputError
 
 Run = Callable[..., tuple[int, str, str]]
-# Of the program's models, one of each kind of steps.
-FITTED = ("gamma-matrix-black", "gain-offset-gamma", "channel-lut", "grey-lut-corrected")
-
 _HEAD = """# A small config
 ocio_profile_version: 2.1
 search_path: "luts:filmic"
@@ -90,18 +84,6 @@ view_transforms:
 )
 
 
-@pytest.fixture(scope="session")
-def fitted() -> dict[str, DisplayProfile]:
-    """Models of a simulated OLED whose channels depend on each other, read with noise."""
-    measured = displays.measure(displays.power_limited, displays.published_protocol(), seed=3)
-    return {name: DisplayProfile(name, characterise(measured, name).chosen.model) for name in FITTED}
-
-
-@pytest.fixture(params=[*builtin_profile_names(), *FITTED])
-def profile(request: pytest.FixtureRequest, fitted: dict[str, DisplayProfile]) -> DisplayProfile:
-    return fitted[request.param] if request.param in fitted else load_profile(request.param)
-
-
 @pytest.fixture(params=[SCENE_CONFIG, DISPLAY_CONFIG], ids=["scene", "display"])
 def base(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     return write_base(tmp_path, request.param)
@@ -114,42 +96,6 @@ def write_base(folder: Path, text: str = SCENE_CONFIG) -> Path:
     rows = "1.1 0 0 0\n0 1 0 0\n0 0 0.9 0\n"
     (path.parent / "luts" / "scale.spimtx").write_text(rows)
     return path
-
-
-def test_steps_are_the_model(profile: DisplayProfile) -> None:
-    """Rounding near black is raised to 1 / gamma: codes where drive is above 1e-5 to 1e-9, all of them in XYZ."""
-    steps = stages(profile.model)
-    codes = np.random.default_rng(0).uniform(0, 1, (5000, 3))
-    codes[:200] = np.linspace(0, 1, 200)[:, None]
-    XYZ = profile.to_XYZ(codes)
-    lit = profile.to_linear(XYZ).min(axis=1) > 1e-5
-    np.testing.assert_allclose(steps.encode(XYZ[lit]), profile.to_codes(XYZ[lit]), atol=1e-9)
-    np.testing.assert_allclose(profile.to_XYZ(steps.encode(XYZ)), XYZ, atol=1e-9)
-    np.testing.assert_allclose(steps.decode(codes), XYZ, atol=1e-12)
-    assert isinstance(steps.curve, SRGB if profile.name == "sRGB" else Power | Tables)
-    assert (steps.interaction is not None) == isinstance(profile.model, CorrectedLut)
-
-
-def test_steps_out_of_gamut_are_the_models(profile: DisplayProfile) -> None:
-    XYZ = np.random.default_rng(1).uniform(0, 1.2, (500, 3))
-    np.testing.assert_allclose(stages(profile.model).encode(XYZ), profile.to_codes(XYZ), atol=1e-9)
-
-
-def test_an_unknown_model_is_refused() -> None:
-    with pytest.raises(DisplayError, match="no steps"):
-        stages(object())  # type: ignore[arg-type]
-
-
-def test_a_sampled_interaction_meets_its_nodes(fitted: dict[str, DisplayProfile]) -> None:
-    interaction = stages(fitted["grey-lut-corrected"].model).interaction
-    assert isinstance(interaction, Interaction)
-    low, high = interaction.span
-    sampled = interaction.sampled(5)
-    np.testing.assert_allclose(sampled[1, 2, 4], interaction.own(low + (high - low) * [0.25, 0.5, 1.0]), atol=1e-12)
-    codes = np.random.default_rng(0).uniform(0, 1, (2000, 3))
-    together = interaction.together(codes)
-    assert (together >= low).all()
-    assert (together <= high).all()
 
 
 def test_ocio_gives_the_codes(profile: DisplayProfile, base: Path, tmp_path: Path) -> None:
