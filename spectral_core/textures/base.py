@@ -6,17 +6,24 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
+import numpy.typing as npt
 
-from spectral_core.arrays import Float32Array, Float64Array
+from spectral_core.arrays import BoolArray, Float32Array, Float64Array
 from spectral_core.errors import TextureError
 
-Kind = Literal["reflectance", "radiance"]
+Kind = Literal["reflectance", "radiance", "counts", "unstated"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+# As stored: any real type, any strides, perhaps a view of a mapped file.
+Samples = npt.NDArray[Any]
 
-# Rows per tile are chosen so that a tile of float32 fills about half of a 2 MB second-level cache.
+# A tile of float32 fills about half of a 2 MB second-level cache.
 _TILE_BYTES = 1024 * 1024
+# What a file may promise before anything of it is believed: sides of an image, and of its product.
+LARGEST_SIDE = 1 << 24
+LARGEST_PIXELS = 1 << 40
 
 
 @dataclass(frozen=True)
@@ -45,9 +52,22 @@ class HyperspectralTexture(ABC):
     height, width
         In pixels; rows run from the top.
     wavelengths_nm
-        (bands,), in the file's order.
+        (bands,), in the file's order: any order, distinct.
     kind
-        ``reflectance`` (0..1) or ``radiance`` (relative power).
+        ``reflectance`` (0..1), ``radiance`` (relative power), ``counts`` (of a camera), or
+        ``unstated`` where the file does not say and nobody has said it.
+    scale
+        Stored value that stands for 1.
+    good
+        (bands,), False for bands that the file says are bad: they have no weight.
+    ignore_value
+        Stored value that stands for no data, None if there is none.
+    fluorescent
+        True if it was measured as fluorescent and reduced to its reflectance: another lamp would
+        excite it otherwise.
+    concurrent
+        Whether `samples` may be called by several threads at once and in any order; else by one, and
+        it is fast from the top down.
     warnings
         What a user should know of it.
     """
@@ -58,12 +78,34 @@ class HyperspectralTexture(ABC):
     width: int
     wavelengths_nm: Float64Array
     kind: Kind
-    scale: float
-    warnings: tuple[str, ...]
+    scale: float = 1.0
+    ignore_value: float | None = None
+    fluorescent: bool = False
+    concurrent: bool = False
+    warnings: tuple[str, ...] = ()
 
     @abstractmethod
-    def rows(self, first: int, count: int) -> Float32Array:
-        """`count` rows from `first` on: (count, width, bands), float32."""
+    def samples(self, first: int, count: int) -> Samples:
+        """`count` rows from `first` on as they are stored: (count, width, bands), any real type.
+
+        In the file's own order of axes: a view with its strides, not a copy, where that is
+        possible. What `values` are is ``(samples - dark) * gain``.
+        """
+
+    @property
+    def gain(self) -> Float64Array:
+        """(bands,) or (width, bands): value per stored unit."""
+        return np.full(self.bands, 1.0 / self.scale)
+
+    @property
+    def dark(self) -> Float64Array:
+        """(bands,) or (width, bands): stored value that stands for 0."""
+        return np.zeros(self.bands)
+
+    @property
+    def good(self) -> BoolArray:
+        """(bands,): which bands can be used."""
+        return np.ones(self.bands, dtype=bool)
 
     @property
     def bands(self) -> int:
@@ -78,6 +120,23 @@ class HyperspectralTexture(ABC):
     def rows_per_tile(self) -> int:
         """Rows that fill a tile, at least one."""
         return max(1, min(self.height, _TILE_BYTES // (self.width * self.bands * 4)))
+
+    def rows(self, first: int, count: int) -> Float32Array:
+        """`count` rows from `first` on: (count, width, bands), float32, no data as NaN.
+
+        What float32 cannot hold becomes infinite, which whoever uses the pixels counts.
+        """
+        stored = self.samples(first, count)
+        with np.errstate(over="ignore", invalid="ignore"):
+            values = np.array(stored, dtype=np.float32, order="C")
+            dark = self.dark
+            if dark.any():
+                values -= dark.astype(np.float32)
+            if (self.gain != 1).any():
+                values *= self.gain.astype(np.float32)
+        if self.ignore_value is not None:
+            values[stored == self.ignore_value] = np.nan
+        return values
 
     def tiles(self) -> Iterator[Tile]:
         """All rows from the top, a tile at a time."""
@@ -107,3 +166,15 @@ def checked_wavelengths(wavelengths: Float64Array, bands: int, path: Path) -> Fl
     if len(np.unique(wavelengths)) < bands:
         raise TextureError("a wavelength occurs twice", where=path, remedy="average or drop one of the two bands")
     return wavelengths
+
+
+def checked_size(width: int, height: int, path: Path) -> None:
+    """Refuse sides that no image has.
+
+    Raises
+    ------
+    TextureError
+        If a side is not positive, or far too large.
+    """
+    if not (0 < width <= LARGEST_SIDE and 0 < height <= LARGEST_SIDE and width * height <= LARGEST_PIXELS):
+        raise TextureError(f"is {width} x {height} pixels", where=path, remedy="it is damaged or no texture")

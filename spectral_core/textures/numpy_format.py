@@ -15,12 +15,12 @@ from pathlib import Path
 from typing import IO, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from spectral_core.arrays import Float32Array, Float64Array, frozen
+from spectral_core.arrays import Float64Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.files import read_text
-from spectral_core.textures.base import HyperspectralTexture, Kind, checked_wavelengths
+from spectral_core.textures.base import HyperspectralTexture, Kind, Samples, checked_wavelengths
+from spectral_core.textures.reading import Reading
 from spectral_core.weights import LARGEST_BANDS
 
 # NumPy types these functions in some versions only.
@@ -38,9 +38,9 @@ class NpyTexture(HyperspectralTexture):
 
     format = "npy"
     kind: Kind = "reflectance"
-    scale = 1.0
+    concurrent = True
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, reading: Reading) -> None:
         with path.open("rb") as stream:
             shape, fortran, dtype = _header(stream, path)
             offset = stream.tell()
@@ -50,20 +50,18 @@ class NpyTexture(HyperspectralTexture):
         self.name = path.stem
         self.height, self.width, bands = shape
         self.wavelengths_nm = frozen(_wavelengths_beside(path, bands))
-        self.warnings = ()
 
-    def rows(self, first: int, count: int) -> Float32Array:
-        """`count` rows from `first` on: (count, width, bands), float32."""
-        return _as_float32(self._cube[first : first + count])
+    def samples(self, first: int, count: int) -> Samples:
+        """`count` rows from `first` on: (count, width, bands)."""
+        return self._cube[first : first + count]
 
 
 class NpzTexture(HyperspectralTexture):
     """A ``.npz`` archive, compressed or not, streamed from its member without unpacking it whole."""
 
     format = "npz"
-    scale = 1.0
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, reading: Reading) -> None:
         self._path = path
         self._next_row = 0
         self._stream: IO[bytes] | None = None
@@ -85,7 +83,6 @@ class NpzTexture(HyperspectralTexture):
         self.name = path.stem
         self.height, self.width, bands = self._shape
         self.wavelengths_nm = frozen(checked_wavelengths(wavelengths, bands, path))
-        self.warnings = ()
 
     def _read_header(
         self, archive: zipfile.ZipFile, info: zipfile.ZipInfo
@@ -96,8 +93,8 @@ class NpzTexture(HyperspectralTexture):
             _check_size(info.file_size - stream.tell(), shape, dtype, self._path)
         return shape, fortran, dtype
 
-    def rows(self, first: int, count: int) -> Float32Array:
-        """`count` rows from `first` on: (count, width, bands), float32. Fast from the top down."""
+    def samples(self, first: int, count: int) -> Samples:
+        """`count` rows from `first` on: (count, width, bands). Fast from the top down."""
         row_bytes = self.width * self.bands * self._dtype.itemsize
         try:
             if self._stream is None or first < self._next_row:
@@ -115,7 +112,7 @@ class NpzTexture(HyperspectralTexture):
                 f"ends in row {first + len(data) // row_bytes}", where=self._path, remedy="write it again"
             )
         self._next_row = first + count
-        return _as_float32(np.frombuffer(data, dtype=self._dtype).reshape(count, self.width, self.bands))
+        return np.frombuffer(data, dtype=self._dtype).reshape(count, self.width, self.bands)
 
     def close(self) -> None:
         """Close the archive; the next read opens it again."""
@@ -127,12 +124,6 @@ class NpzTexture(HyperspectralTexture):
 def _damaged(error: Exception, path: Path) -> TextureError:
     """Messages of zipfile may quote names of the archive, of any length."""
     return TextureError(f"is a damaged archive ({str(error)[:120]})", where=path, remedy="write it again")
-
-
-def _as_float32(values: npt.NDArray[Any]) -> Float32Array:
-    """What float32 cannot hold becomes infinite, which whoever uses the pixels refuses."""
-    with np.errstate(over="ignore"):
-        return np.ascontiguousarray(values, dtype=np.float32)
 
 
 def _header(stream: IO[bytes], path: Path) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:

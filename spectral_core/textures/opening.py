@@ -8,6 +8,7 @@ from spectral_core.errors import TextureError
 from spectral_core.files import is_file, why_no_file
 from spectral_core.textures.base import HyperspectralTexture
 from spectral_core.textures.numpy_format import NpyTexture, NpzTexture
+from spectral_core.textures.reading import Reading
 from spectral_core.textures.spectral_exr import SpectralExrTexture
 
 _FORMATS = (
@@ -17,7 +18,7 @@ _FORMATS = (
 )
 
 
-def open_texture(path: str | Path) -> HyperspectralTexture:
+def open_texture(path: str | Path, reading: Reading | None = None) -> HyperspectralTexture:
     """Open a hyperspectral texture: ``.npy`` with its wavelengths beside it, ``.npz``, spectral OpenEXR.
 
     Raises
@@ -35,6 +36,6 @@ def open_texture(path: str | Path) -> HyperspectralTexture:
         raise TextureError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
     for signature, texture in _FORMATS:
         if head.startswith(signature):
-            return texture(path)
+            return texture(path, reading or Reading())
     what = "is empty" if not head else "is no texture of a known format"
     raise TextureError(what, where=path, remedy="give .npy, .npz or spectral OpenEXR")

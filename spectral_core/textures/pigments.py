@@ -18,7 +18,7 @@ import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array, frozen
 from spectral_core.errors import TextureError
-from spectral_core.textures.base import HyperspectralTexture, Kind
+from spectral_core.textures.base import HyperspectralTexture, Kind, Samples
 from spectral_core.textures.skin import directions, mottle, spots
 
 HEIGHT, WIDTH = 256, 512
@@ -130,7 +130,6 @@ class PigmentTexture(HyperspectralTexture):
 
     format = "synthetic"
     kind: Kind = "reflectance"
-    scale = 1.0
     height, width = HEIGHT, WIDTH
 
     def __init__(self, name: str, concentrations: Callable[[Float32Array], Maps]) -> None:
@@ -147,7 +146,7 @@ class PigmentTexture(HyperspectralTexture):
         amounts = np.stack([np.broadcast_to(each, (self.height, self.width)) for each in maps.values()], axis=-1)
         return np.maximum(amounts, 0).astype(np.float32), np.array(per_unit, dtype=np.float32)
 
-    def rows(self, first: int, count: int) -> Float32Array:
+    def samples(self, first: int, count: int) -> Samples:
         """`count` rows from `first` on: (count, width, bands), float32."""
         amounts, per_unit = self._maps
         inside = kubelka_munk(amounts[first : first + count] @ per_unit)

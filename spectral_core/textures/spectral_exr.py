@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from spectral_core.arrays import Float32Array, frozen
+from spectral_core.arrays import frozen
 from spectral_core.errors import TextureError
 from spectral_core.imaging import error_text, oiio
-from spectral_core.textures.base import HyperspectralTexture, Kind, checked_wavelengths
+from spectral_core.textures.base import HyperspectralTexture, Kind, Samples, checked_wavelengths
+from spectral_core.textures.reading import Reading
 
 _NUMBER = r"(\d*,?\d*(?:[Ee][+-]?\d+)?)"
 _UNIT = r"(Y|Z|E|P|T|G|M|k|h|da|d|c|m|u|n|p)?(m|Hz)"
@@ -33,9 +34,8 @@ class SpectralExrTexture(HyperspectralTexture):
     """A spectral OpenEXR image of reflectance or radiance."""
 
     format = "spectral OpenEXR"
-    scale = 1.0
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, reading: Reading) -> None:
         self._path = path
         self._input = oiio().ImageInput.open(str(path))
         if self._input is None:
@@ -54,14 +54,13 @@ class SpectralExrTexture(HyperspectralTexture):
         self._origin_y = int(spec.y)
         self._tile_rows = int(spec.tile_height)
         self.name = path.stem
-        self.warnings = ()
 
     def rows_per_tile(self) -> int:
         """Rows that fill a tile, in whole rows of the file's own tiles if it has some."""
         rows = super().rows_per_tile()
         return -(-rows // self._tile_rows) * self._tile_rows if self._tile_rows else rows
 
-    def rows(self, first: int, count: int) -> Float32Array:
+    def samples(self, first: int, count: int) -> Samples:
         """`count` rows from `first` on: (count, width, bands), float32."""
         channels = list(self._channels)
         low, high = min(channels), max(channels) + 1
