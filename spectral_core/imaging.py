@@ -9,6 +9,7 @@ from types import ModuleType
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from spectral_core.arrays import Float32Array
 from spectral_core.display.models import srgb_encode
@@ -16,6 +17,8 @@ from spectral_core.errors import OutputError
 from spectral_core.files import atomic_path
 
 ImageFormat = Literal["exr", "png8", "png16", "tiff"]
+# Largest integer of a code, None for linear floats.
+LEVELS: dict[str, int | None] = {"exr": None, "png8": 255, "png16": 65535, "tiff": 65535}
 IMAGE_FORMATS: dict[str, tuple[str, str]] = {
     "exr": (".exr", "half"),
     "png8": (".png", "uint8"),
@@ -74,8 +77,8 @@ class ImageWriter:
         if self._output is None or not self._output.open(str(path), spec):
             raise OutputError(f"cannot be written ({self._error()})", where=path, remedy="choose another folder")
 
-    def write(self, rows: Float32Array) -> None:
-        """Append rows (count, width, 3), float32; integers are rounded from 0..1."""
+    def write(self, rows: npt.NDArray[Any]) -> None:
+        """Append rows (count, width, 3): integers as they are, or float32 that is rounded to them from 0..1."""
         count = len(rows)
         if not self._output.write_scanlines(self._row, self._row + count, 0, np.ascontiguousarray(rows)):
             raise OutputError(f"cannot be written ({self._error()})", where=self._path, remedy="is the disk full?")

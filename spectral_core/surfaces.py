@@ -62,7 +62,7 @@ class Surface:
         if self.texture is None:
             return np.asarray(self.reflectance @ light.weighting_factors(self.wavelengths_nm, observer).matrix)
         weights = level2_weights(self.texture, [light], observer)
-        return np.concatenate([tile for _, tile in project(self.texture, weights)]).astype(np.float64)
+        return project(self.texture, weights).astype(np.float64)
 
     def reference_rgb(self, reference: Light) -> Float64Array:
         """Linear sRGB that an RGB pipeline has for it: the maker's, else its colour under the

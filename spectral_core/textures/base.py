@@ -68,6 +68,9 @@ class HyperspectralTexture(ABC):
     concurrent
         Whether `samples` may be called by several threads at once and in any order; else by one, and
         it is fast from the top down.
+    files
+        The files that it is read from, so that others can open it again and see whether it changed;
+        none for what is computed or in memory. The first is what `open_texture` was given.
     warnings
         What a user should know of it.
     """
@@ -82,6 +85,7 @@ class HyperspectralTexture(ABC):
     ignore_value: float | None = None
     fluorescent: bool = False
     concurrent: bool = False
+    files: tuple[Path, ...] = ()
     warnings: tuple[str, ...] = ()
 
     @abstractmethod

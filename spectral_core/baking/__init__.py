@@ -1,0 +1,7 @@
+"""Hyperspectral textures under lights: one streamed pass, all lights at once."""
+
+from spectral_core.baking.projection import level2_weights, project
+from spectral_core.baking.records import BakedImage
+from spectral_core.baking.run import BakeResult, bake, file_name
+
+__all__ = ["BakeResult", "BakedImage", "bake", "file_name", "level2_weights", "project"]

@@ -1,0 +1,83 @@
+"""From a strip's columns to the pixels of an image, while they are still in the cache.
+
+An image holds linear RGB of a display or its device codes. Where the display's primaries add up,
+which is the rule, their matrix is folded into the weights of the projection and costs nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from spectral_core.arrays import Float32Array, Float64Array
+from spectral_core.display import DisplayProfile, SRGBCurve
+from spectral_core.display.models.matrix import GammaMatrix
+from spectral_core.display.profile import GAMUT_TOLERANCE, in_gamut
+
+Pixels = npt.NDArray[Any]
+
+# XYZ at which a model's linear part is looked at: black, the axes, and what a matrix must then give.
+_PROBES = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0.4, 0.5, 0.6], [1.2, 0.1, 0.9]])
+# IEC 61966-2-1.
+_SRGB_SLOPE, _SRGB_END = 12.92, 0.0031308
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How linear colours become pixels.
+
+    Attributes
+    ----------
+    profile
+        The display.
+    levels
+        Largest integer of a code, 255 or 65535; None for linear floats.
+    """
+
+    profile: DisplayProfile
+    levels: int | None
+
+    def linear_part(self) -> tuple[Float64Array, Float64Array] | None:
+        """Matrix (3, 3) and offset (3,) of ``linear = XYZ @ matrix + offset``, None if it is no such thing."""
+        values = self.profile.to_linear(_PROBES)
+        offset = values[0]
+        matrix = values[1:4] - offset
+        # Rounding of the model's own arithmetic, and no curve whatsoever.
+        if np.abs(_PROBES @ matrix + offset - values).max() > 1e-9:
+            return None
+        return matrix, offset
+
+    def pixels(self, linear: Float32Array) -> Pixels:
+        """Pixels (..., 3) of linear RGB (..., 3): float32 as they are, or codes clipped to 0..1 and rounded."""
+        if self.levels is None:
+            return linear
+        codes = self._codes(linear)
+        codes *= np.float32(self.levels)
+        codes += np.float32(0.5)
+        return codes.astype(np.uint8 if self.levels < 256 else np.uint16)
+
+    def _codes(self, linear: Float32Array) -> Float32Array:
+        """Clipped codes; in float32 where they are powers, 2e-7 of white: a hundredth of a 16-bit step."""
+        model = self.profile.model
+        if isinstance(model, GammaMatrix):
+            return np.power(np.clip(linear, 0.0, 1.0), (1 / model.gamma).astype(np.float32))
+        if not isinstance(model, SRGBCurve):
+            return np.clip(model.encode(linear), 0.0, 1.0).astype(np.float32)
+        inside = np.clip(linear, 0.0, 1.0)
+        curve = np.power(inside, np.float32(1 / 2.4))
+        curve *= np.float32(1.055)
+        curve -= np.float32(0.055)
+        # The straight part lies above the curve below the threshold, and is cut off at its end above it.
+        inside *= np.float32(_SRGB_SLOPE)
+        np.minimum(inside, np.float32(_SRGB_SLOPE * _SRGB_END), out=inside)
+        return np.maximum(curve, inside, out=curve)
+
+
+def count_outside(linear: Float32Array) -> int:
+    """How many of the colours (n, 3) are out of gamut."""
+    if linear.min() >= -GAMUT_TOLERANCE and linear.max() <= 1 + GAMUT_TOLERANCE:
+        return 0
+    return int((~in_gamut(linear)).sum())

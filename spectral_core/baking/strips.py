@@ -1,0 +1,148 @@
+"""What is made of each strip of a bake, in this process or on a worker of a cluster."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from spectral_core.arrays import Float32Array, IntArray
+from spectral_core.baking.encoding import Encoding, Pixels, count_outside
+from spectral_core.baking.pixels import BadPixels, PixelCounts
+from spectral_core.baking.products import Product
+from spectral_core.baking.projection import Projection, Rows, level2_weights, project_rows, projection
+from spectral_core.display import DisplayProfile
+from spectral_core.errors import TextureError
+from spectral_core.lights import Light
+from spectral_core.textures import HyperspectralTexture
+
+# Beyond it images of half floats would hold infinity.
+_LARGEST_HALF = 65504.0
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One of the images that are made: a light and a level."""
+
+    light: Light
+    level: int
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that turns rows as stored into pixels; it can be sent to another machine.
+
+    Attributes
+    ----------
+    pictures
+        What is made.
+    how
+        Onto linear RGB of each picture's light, or onto XYZ where the display's primaries do not add up.
+    folded
+        Whether `how` gives linear RGB.
+    sources
+        (pictures,), which of the projection's colours a picture is made of.
+    factors
+        (pictures, 3), what its linear RGB is multiplied by: the lamp's colour at level 1.
+    encoding
+        Of the pixels.
+    bad_pixels
+        What to do with values that are no numbers.
+    """
+
+    pictures: tuple[Picture, ...]
+    how: Projection
+    folded: bool
+    sources: tuple[int, ...]
+    factors: Float32Array
+    encoding: Encoding
+    bad_pixels: BadPixels
+
+
+@dataclass(frozen=True)
+class BakedStrip:
+    """Pixels (rows, width, 3) of each picture, how many were out of gamut, what was wrong, and the seconds it took."""
+
+    pixels: tuple[Pixels, ...]
+    outside: IntArray
+    counts: PixelCounts
+    read_seconds: float
+    project_seconds: float
+
+
+def recipe(
+    texture: HyperspectralTexture,
+    pictures: Sequence[Picture],
+    reference: Light,
+    profile: DisplayProfile,
+    levels: int | None,
+    observer: str,
+    bad_pixels: BadPixels,
+) -> Recipe:
+    """How pictures of a texture are made; `reference` is the light of level 1's RGB camera."""
+    lights: list[Light] = []
+    sources = []
+    for picture in pictures:
+        seen = picture.light if picture.level == 2 else reference
+        if not any(seen is each for each in lights):
+            lights.append(seen)
+        sources.append(next(index for index, each in enumerate(lights) if each is seen))
+    weights = level2_weights(texture, lights, observer)
+    encoding = Encoding(profile, levels)
+    part = encoding.linear_part()
+    constant = None
+    if part is not None:
+        matrix, offset = part
+        weights = (weights.reshape(-1, len(lights), 3) @ matrix).reshape(weights.shape)
+        constant = np.tile(offset, len(lights))
+    lamps = [
+        profile.to_linear(picture.light.XYZ(observer)) if picture.level == 1 else np.ones(3) for picture in pictures
+    ]
+    return Recipe(
+        pictures=tuple(pictures),
+        how=projection(texture, weights, constant),
+        folded=part is not None,
+        sources=tuple(sources),
+        factors=np.array(lamps, dtype=np.float32),
+        encoding=encoding,
+        bad_pixels=bad_pixels,
+    )
+
+
+def bake_rows(texture: HyperspectralTexture, recipe: Recipe, rows: Rows, product: Product) -> BakedStrip:
+    """The pixels of some rows.
+
+    Raises
+    ------
+    TextureError
+        If values are no numbers and shall not be repaired, or far too large.
+    """
+    started = time.perf_counter()
+    first, height = rows.strip
+    values = np.empty((height * texture.width, recipe.how.columns), dtype=np.float32)
+    counts = project_rows(texture, recipe.how, rows, product, values, recipe.bad_pixels)
+    linear = _linear(texture, recipe, first, values)
+    pixels, outside = [], np.zeros(len(recipe.pictures), dtype=np.int64)
+    for index, (source, factor) in enumerate(zip(recipe.sources, recipe.factors, strict=True)):
+        colours = np.ascontiguousarray(linear[:, source])
+        if recipe.pictures[index].level == 1:
+            colours *= factor
+        outside[index] = count_outside(colours)
+        pixels.append(recipe.encoding.pixels(colours).reshape(height, texture.width, 3))
+    return BakedStrip(tuple(pixels), outside, counts, rows.seconds, time.perf_counter() - started)
+
+
+def _linear(texture: HyperspectralTexture, recipe: Recipe, first: int, values: Float32Array) -> Float32Array:
+    """Linear RGB (pixels, colours, 3), within what half floats hold."""
+    colours = values.reshape(len(values), -1, 3)
+    linear = colours if recipe.folded else recipe.encoding.profile.to_linear(colours).astype(np.float32)
+    largest = max(float(linear.max()), -float(linear.min()))
+    # Not a number is not below anything either.
+    if not largest <= _LARGEST_HALF:
+        raise TextureError(
+            f"'{texture.name}' has values up to {largest:.3g} times white in the rows from {first}",
+            remedy="divide counts by the white reference, or give the scale of the values",
+        )
+    return linear
