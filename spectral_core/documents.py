@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -17,13 +18,14 @@ from spectral_core.display.measuring.measurements import Measurements
 from spectral_core.display.profile import in_gamut
 from spectral_core.errors import LightError, TextureError
 from spectral_core.lights import Light, LightQuality, builtin_names
-from spectral_core.report.documents import Document, bake_document
+from spectral_core.report.documents import Document, bake_document, bakes_document
 from spectral_core.spectra import Spectra
 from spectral_core.textures import HyperspectralTexture
 
 __all__ = [
     "advice_document",
     "bake_document",
+    "bakes_document",
     "characterise_document",
     "design",
     "design_table",
@@ -138,6 +140,23 @@ def reflectance_document(spectra: Spectra, light: Light, profile: DisplayProfile
     ]
     warnings = [*spectra.warnings, *light.warnings, *_extension(factors)]
     return {"light": light.name, "colours": colours, "warnings": warnings}
+
+
+def check_names(textures: Mapping[Path, HyperspectralTexture]) -> None:
+    """Refuse textures whose images would have the same names.
+
+    Raises
+    ------
+    TextureError
+        If two textures have one name.
+    """
+    first: dict[str, Path] = {}
+    for path, texture in textures.items():
+        other = first.setdefault(texture.name, path)
+        if other != path:
+            raise TextureError(
+                f"its images would be named like those of {other}", where=path, remedy="bake it into another folder"
+            )
 
 
 def texture_document(texture: HyperspectralTexture) -> Document:

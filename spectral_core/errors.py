@@ -44,6 +44,10 @@ class OutputError(SpectralBoothError):
     """A result that cannot be written."""
 
 
+class ClusterError(SpectralBoothError):
+    """A cluster that is not there, or did not do its part."""
+
+
 class BlenderError(SpectralBoothError):
     """Blender is missing, or did not do what was asked."""
 

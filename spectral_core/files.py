@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import tempfile
+import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from spectral_core.errors import OutputError, SpectralBoothError
@@ -71,7 +73,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
                 "is a folder" if target.is_dir() else "is no ordinary file", where=path, remedy="name a file"
             )
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(prefix=f".{target.stem}.", suffix=target.suffix, dir=target.parent)
+        _remove_leftovers(target)
+        handle, name = tempfile.mkstemp(prefix=_prefix(target, os.getpid()), suffix=target.suffix, dir=target.parent)
         os.close(handle)
     except OSError as error:
         raise OutputError(
@@ -88,6 +91,34 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
         raise OutputError(f"cannot be written ({error.strerror})", where=target, remedy="is the disk full?") from None
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def _prefix(target: Path, process: int) -> str:
+    """Temporary names tell whose they are: a machine and a process."""
+    return f".{target.stem}.{uuid.getnode():x}-{process}."
+
+
+def _remove_leftovers(target: Path) -> None:
+    """Remove what killed processes of this machine left of `target`."""
+    if os.name != "posix":  # elsewhere asking after a process may end it
+        return
+    # Compared by hand: a name may hold what a pattern would take for a rule.
+    pattern = re.compile(rf"{re.escape(_prefix(target, 0)[:-2])}(\d+)\..*{re.escape(target.suffix)}", re.DOTALL)
+    with suppress(OSError):  # a folder that may be written to but not listed
+        for each in target.parent.iterdir():
+            match = pattern.fullmatch(each.name)
+            if match and not _runs(int(match[1])):
+                each.unlink(missing_ok=True)
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # it is somebody else's, or no process at all
+        return True
+    return True
 
 
 def _umask() -> int:

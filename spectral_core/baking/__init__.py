@@ -1,7 +1,17 @@
 """Hyperspectral textures under lights: one streamed pass, all lights at once."""
 
+from spectral_core.baking.pixels import PixelCounts
 from spectral_core.baking.projection import level2_weights, project
 from spectral_core.baking.records import BakedImage
-from spectral_core.baking.run import BakeResult, bake, file_name
+from spectral_core.baking.run import BakeResult, bake, bake_to_memory, file_name
 
-__all__ = ["BakeResult", "BakedImage", "bake", "file_name", "level2_weights", "project"]
+__all__ = [
+    "BakeResult",
+    "BakedImage",
+    "PixelCounts",
+    "bake",
+    "bake_to_memory",
+    "file_name",
+    "level2_weights",
+    "project",
+]

@@ -18,8 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
+from spectral_core.baking.encoding import Pixels
 from spectral_core.baking.pixels import TOLERANCE_ABOVE_1, BadPixels, PixelCounts
-from spectral_core.baking.projection import in_order
+from spectral_core.baking.products import Product
+from spectral_core.baking.projection import Rows, in_order
 from spectral_core.baking.records import BakedImage, Origin, kept_images, record_path, write_record
 from spectral_core.baking.strips import BakedStrip, Picture, Recipe, bake_rows, recipe
 from spectral_core.display import DisplayProfile, srgb
@@ -135,6 +137,8 @@ def bake(
         with _writers(texture, list(wanted), image_format, profile is srgb()) as write:
             for strip in (strips or _here)(texture, plan):
                 tally.add(strip, write)
+            if tally.counts.lost == texture.width * texture.height:
+                raise TextureError(f"no pixel holds a number in '{texture.name}'", remedy="repair the capture")
         shares = tally.outside / (texture.width * texture.height)
         for (path, picture), share in zip(wanted.items(), shares.tolist(), strict=True):
             factors = picture.light.weighting_factors(texture.wavelengths_nm[texture.good], observer)
@@ -149,6 +153,41 @@ def bake(
         counts=tally.counts,
         warnings=(*texture.warnings, *_warnings(texture, tally.counts)),
     )
+
+
+def bake_to_memory(
+    texture: HyperspectralTexture,
+    lights: Sequence[Light],
+    profile: DisplayProfile | None = None,
+    image_format: ImageFormat = "exr",
+    observer: str = DEFAULT_OBSERVER,
+    bad_pixels: BadPixels = "repair",
+) -> tuple[tuple[Pixels, ...], PixelCounts]:
+    """Images (height, width, 3) of `texture`, one per light, as `bake` would write them, and what was wrong.
+
+    ``exr`` gives linear float32, ``png8`` uint8 codes, ``png16`` and ``tiff`` uint16 codes.
+
+    Raises
+    ------
+    TextureError
+        If the texture is not reflectance or damaged.
+    """
+    if texture.kind != "reflectance":
+        raise _no_reflectance(texture)
+    profile, levels = profile or srgb(), LEVELS[image_format]
+    pictures = [Picture(light, 2) for light in lights]
+    plan = recipe(texture, pictures, Light.builtin("D65"), profile, levels, observer, bad_pixels)
+    dtype = np.float32 if levels is None else np.uint8 if levels < 256 else np.uint16
+    images = tuple(np.empty((texture.height, texture.width, 3), dtype=dtype) for _ in lights)
+
+    def one(rows: Rows, product: Product) -> PixelCounts:
+        first, height = rows.strip
+        strip = bake_rows(texture, plan, rows, product)
+        for image, pixels in zip(images, strip.pixels, strict=True):
+            image[first : first + height] = pixels
+        return strip.counts
+
+    return images, sum(in_order(texture, plan.how, one), start=PixelCounts())
 
 
 class _Tally:

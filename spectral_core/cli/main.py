@@ -5,27 +5,24 @@ from __future__ import annotations
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import click
 
 from spectral_core import documents
-from spectral_core.baking import bake
 from spectral_core.cli.blender import add_blender_commands
 from spectral_core.cli.compare import add_compare_command
-from spectral_core.cli.console import cell, emit, facts, progress_bar, rounded, table
+from spectral_core.cli.console import emit, facts, rounded, table
 from spectral_core.cli.display import add_display_commands
 from spectral_core.cli.luminance import add_luminance_commands
 from spectral_core.cli.options import FiniteRange, as_json, light_option, observer_option, profile_option
 from spectral_core.cli.patches import add_patch_commands
 from spectral_core.cli.probe import add_probe_command
 from spectral_core.cli.profile import add_profile_commands
+from spectral_core.cli.textures import add_texture_commands
 from spectral_core.display import load_profile
 from spectral_core.errors import LightError, SpectralBoothError
-from spectral_core.imaging import IMAGE_FORMATS
 from spectral_core.lights import Light
 from spectral_core.spectra import colorchecker_spectra, read_spectra, write_spectra
-from spectral_core.textures import open_texture
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -115,72 +112,13 @@ def reflectance(file: str, light: str, profile: str, observer: str, json: bool) 
     emit(document, json, lambda console: console.print(table(columns, rows)))
 
 
-@cli.group()
-def texture() -> None:
-    """Look into hyperspectral textures."""
-
-
-@texture.command("info")
-@click.argument("file", type=click.Path(path_type=Path))
-@as_json
-def texture_info(file: Path, json: bool) -> None:
-    """What FILE holds."""
-    document = documents.texture_document(open_texture(file))
-    emit(document, json, lambda console: console.print(facts(document)))
-
-
-@texture.command("pixel")
-@click.argument("file", type=click.Path(path_type=Path))
-@click.argument("x", type=int)
-@click.argument("y", type=int)
-@click.option("--light", metavar="LIGHT", help="also its colour under this light")
-@observer_option
-@as_json
-def texture_pixel(file: Path, x: int, y: int, light: str | None, observer: str, json: bool) -> None:
-    """The spectrum at column X (to the right) and row Y (down), both from 0."""
-    document = documents.pixel_document(open_texture(file), file, x, y, Light.load(light) if light else None, observer)
-    rows = list(zip((cell(nm) for nm in document["wavelengths_nm"]), document["reflectance"], strict=True))
-
-    def show(console: Any) -> None:
-        console.print(table(("nm", "value"), rows))
-        if light:
-            console.print(facts({key: document[key] for key in ("XYZ", "rgb_8bit")}))
-
-    emit(document, json, show)
-
-
-@cli.command("bake")
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--light", "lights", metavar="LIGHT", multiple=True, required=True, help="repeat for several")
-@click.option("-o", "--output", type=click.Path(path_type=Path), required=True, help="folder for the images")
-@profile_option
-@click.option("--format", "image_format", type=click.Choice(sorted(IMAGE_FORMATS)), default="exr", show_default=True)
-@click.option("--level", "levels", type=click.Choice(["1", "2"]), multiple=True, default=("2",), show_default=True)
-@observer_option
-@as_json
-def bake_command(
-    file: Path, lights: Sequence[str], output: Path, profile: str, image_format: Any, levels: Sequence[str],
-    observer: str, json: bool,
-) -> None:  # fmt: skip
-    """Bake the texture FILE under lights, one image each, in one pass."""
-    chosen = [Light.load(each) for each in lights]
-    opened = open_texture(file)
-    with progress_bar(f"baking {file.name}") as progress:
-        result = bake(
-            opened, chosen, output, load_profile(profile), image_format, observer,
-            tuple(int(level) for level in levels), progress=progress,
-        )  # fmt: skip
-    document = documents.bake_document(result)
-    rows = [[each["path"], each["light"], each["level"], each["clipped_fraction"]] for each in document["outputs"]]
-    emit(document, json, lambda console: console.print(table(("file", "light", "level", "share clipped"), rows)))
-
-
 add_display_commands(cli)
 add_profile_commands(cli)
 add_luminance_commands(cli)
 add_probe_command(cli)
 add_compare_command(cli)
 add_patch_commands(cli)
+add_texture_commands(cli)
 add_blender_commands(cli)
 
 

@@ -36,6 +36,8 @@ def open_texture(path: str | Path, reading: Reading | None = None) -> Hyperspect
         raise TextureError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
     for signature, texture in _FORMATS:
         if head.startswith(signature):
-            return texture(path, reading or Reading())
+            opened = texture(path, reading or Reading())
+            opened.files = (path,)
+            return opened
     what = "is empty" if not head else "is no texture of a known format"
     raise TextureError(what, where=path, remedy="give .npy, .npz or spectral OpenEXR")

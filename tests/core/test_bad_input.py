@@ -175,7 +175,8 @@ def test_archives_that_are_no_textures(run: Run, tmp_path: Path) -> None:
         np.savez(path, **arrays)  # type: ignore[arg-type]
         refused(run("texture", "info", path), word.split(" (")[0])
     np.savez(path, reflectance=np.full((4, 4, 5), np.nan, np.float32), wavelengths_nm=nm)
-    refused(run("bake", path, "--light", "D65", "-o", tmp_path), "no finite number in row 0")
+    refused(run("bake", path, "--light", "D65", "-o", tmp_path), "no pixel holds a number")
+    refused(run("bake", path, "--light", "D65", "-o", tmp_path, "--bad-pixels", "refuse"), "no finite number in row 0")
     assert not list(tmp_path.glob("*.exr"))
     path.write_bytes(path.read_bytes()[:200])
     refused(run("texture", "info", path), "damaged archive")
@@ -217,7 +218,8 @@ def test_values_beyond_float32_are_told_without_python_warnings(run: Run, tmp_pa
     path = tmp_path / "cube.npz"
     np.savez(path, reflectance=np.full((4, 4, 2), 1e300), wavelengths_nm=np.array([400.0, 500.0]))
     refused(run("texture", "pixel", path, "0", "0"), "no finite number")
-    refused(run("bake", path, "--light", "D65", "-o", tmp_path), "no finite number in row 0")
+    refused(run("bake", path, "--light", "D65", "-o", tmp_path), "no pixel holds a number")
+    refused(run("bake", path, "--light", "D65", "-o", tmp_path, "--bad-pixels", "refuse"), "no finite number in row 0")
 
 
 def test_counts_taken_for_reflectance(run: Run, tmp_path: Path) -> None:

@@ -1,0 +1,116 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as npst
+
+from spectral_core.baking import PixelCounts, bake, level2_weights, project
+from spectral_core.baking.pixels import interpolated
+from spectral_core.errors import TextureError
+from spectral_core.lights import Light
+from spectral_core.textures import ArrayTexture
+
+NM = np.linspace(400.0, 700.0, 31)
+D65 = [Light.builtin("D65")]
+
+
+@given(
+    npst.arrays(np.float64, (5, 9), elements=st.floats(-1, 2)),
+    npst.arrays(np.bool_, (5, 9)),
+    st.lists(st.floats(0.1, 50), min_size=9, max_size=9),
+)
+@settings(max_examples=200, deadline=None)
+def test_gaps_are_filled_as_numpy_interpolates(spectra: np.ndarray, missing: np.ndarray, gaps: list[float]) -> None:
+    """1e-12: rounding of one multiplication and one addition of numbers up to 3."""
+    nm = 380 + np.cumsum(gaps)
+    filled = interpolated(spectra, missing, nm)
+    for spectrum, gone, result in zip(spectra, missing, filled, strict=True):
+        expected = np.zeros(9) if gone.all() else np.interp(nm, nm[~gone], spectrum[~gone])
+        np.testing.assert_allclose(result, expected, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(result[~gone], spectrum[~gone])
+
+
+def test_repaired_lost_negative_and_above_are_counted() -> None:
+    cube = np.full((6, 7, 31), 0.5, dtype=np.float32)
+    cube[0, 0, 10] = np.nan
+    cube[1, 2, [0, 1, 30]] = np.inf, np.nan, -np.inf
+    cube[2, 3] = np.nan
+    cube[3, 3, 4] = -0.01
+    cube[4, :2, 5] = 1.06
+    cube[5, 5, 5] = 1.05
+    texture = ArrayTexture(cube, NM)
+    weights = level2_weights(texture, D65)
+    XYZ = project(texture, weights, bad_pixels="repair")
+    grey = 0.5 * weights.sum(axis=0)
+    np.testing.assert_allclose(XYZ[0, 0], grey, atol=1e-6)
+    np.testing.assert_allclose(XYZ[1, 2], grey, atol=1e-6)
+    np.testing.assert_array_equal(XYZ[2, 3], 0)
+    np.testing.assert_allclose(XYZ[3, 3], cube[3, 3].astype(float) @ weights, atol=1e-6)
+    np.testing.assert_allclose(XYZ[4, 0], cube[4, 0].astype(float) @ weights, atol=1e-6)
+    with pytest.raises(TextureError, match="no finite number in row 0"):
+        project(texture, weights)
+
+
+def test_a_bake_tells_what_it_did(tmp_path: Path) -> None:
+    cube = np.full((6, 7, 31), 0.5, dtype=np.float32)
+    cube[0, :3, 10] = np.nan
+    cube[2, 3] = np.nan
+    cube[3, 3, 4] = -0.01
+    cube[4, :2, 5] = 1.06
+    result = bake(ArrayTexture(cube, NM, "capture"), D65, tmp_path)
+    assert result.counts == PixelCounts(repaired=3, lost=1, negative=1, above=2)
+    told = "\n".join(result.warnings)
+    for words in (
+        "3 of 42 pixels have values",
+        "1 of 42 pixels hold no number",
+        "0.08% of the values are neg",
+        "0.15%",
+    ):
+        assert words in told
+
+
+def test_values_of_no_data_are_no_values() -> None:
+    """An ignored integer within the range of the others."""
+    cube = np.random.default_rng(0).integers(1000, 9000, (5, 6, 31)).astype(np.int16)
+    cube[2, 2, 5:8] = 5000
+    texture = ArrayTexture(cube, NM, scale=10_000)
+    texture.ignore_value = 5000
+    mended = cube.astype(np.float64)
+    mended[2, 2, 5:8] = np.interp([5, 6, 7], [4, 8], mended[2, 2, [4, 8]])
+    for place in np.argwhere((cube == 5000) & ~((np.arange(31) > 4) & (np.arange(31) < 8))):
+        pytest.fail(f"the random cube holds the value at {place}")
+    weights = level2_weights(texture, D65)
+    XYZ = project(texture, weights, bad_pixels="repair")
+    np.testing.assert_allclose(XYZ, mended / 10_000 @ weights, rtol=0, atol=3e-6)
+    assert np.isnan(texture.rows(2, 1)[0, 2, 5:8]).all()
+
+
+def test_a_line_in_reflectance_not_in_counts() -> None:
+    """With a gain per band the line between neighbours is one of reflectances."""
+    rng = np.random.default_rng(1)
+    gain = rng.uniform(0.2, 2.0, 31)
+
+    class Gained(ArrayTexture):
+        @property
+        def gain(self) -> np.ndarray:
+            return gain
+
+    straight = np.linspace(0.2, 0.8, 31)
+    stored = np.broadcast_to(straight / gain, (3, 4, 31)).astype(np.float32)
+    stored = stored.copy()
+    stored[1, 1, [4, 5, 20]] = np.nan
+    texture = Gained(stored, NM)
+    weights = level2_weights(texture, D65)
+    np.testing.assert_allclose(
+        project(texture, weights, "repair"), np.broadcast_to(straight @ weights, (3, 4, 3)), atol=3e-6
+    )
+
+
+def test_values_too_large_to_add_up_are_refused() -> None:
+    cube = np.full((3, 4, 31), 3e38, dtype=np.float32)
+    with pytest.raises(TextureError, match="too large"):
+        project(ArrayTexture(cube, NM), 1e3 * level2_weights(ArrayTexture(cube, NM), D65))

@@ -1,0 +1,166 @@
+"""Bakes that are stopped, killed or repeated: images are whole, kept where they would come out the same."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spectral_core.baking import bake
+from spectral_core.files import atomic_path
+from spectral_core.imaging import oiio
+from spectral_core.lights import Light
+from spectral_core.textures import open_texture
+
+Run = Callable[..., tuple[int, str, str]]
+NM = np.arange(400.0, 701.0, 10)
+SHAPE = (300, 200)
+
+
+def write_textures(folder: Path, count: int) -> list[Path]:
+    paths = [folder / f"t{index}.npz" for index in range(count)]
+    for index, path in enumerate(paths):
+        cube = np.random.default_rng(index).random((*SHAPE, len(NM)), dtype=np.float32)
+        np.savez(path, reflectance=cube, wavelengths_nm=NM)
+    return paths
+
+
+def times(folder: Path) -> dict[str, int]:
+    return {path.name: path.stat().st_mtime_ns for path in folder.iterdir() if path.suffix == ".exr"}
+
+
+@pytest.fixture
+def baked(tmp_path: Path) -> Callable[..., list[bool]]:
+    """Bake a texture again with some things changed; which of its images were kept."""
+    (path,) = write_textures(tmp_path, 1)
+
+    def again(lights: tuple[str, ...] = ("D65", "A"), **changed: Any) -> list[bool]:
+        result = bake(open_texture(path), [Light.builtin(each) for each in lights], tmp_path / "out", **changed)
+        return [image.kept for image in result.images]
+
+    assert again() == [False, False]
+    return again
+
+
+def test_images_that_would_come_out_the_same_are_kept(baked: Callable[..., list[bool]], tmp_path: Path) -> None:
+    before = times(tmp_path / "out")
+    assert baked() == [True, True]
+    assert baked(("A", "FL11", "D65")) == [True, False, True]
+    after = times(tmp_path / "out")
+    assert {name: after[name] for name in before} == before
+    assert baked(again=True) == [False, False]
+
+
+@pytest.mark.parametrize(
+    "changed", [{"observer": "cie1964-10"}, {"bad_pixels": "refuse"}, {"profile": "htc-vive-2021"}]
+)  # fmt: skip
+def test_what_would_come_out_otherwise_is_made(baked: Callable[..., list[bool]], changed: dict[str, Any]) -> None:
+    from spectral_core.display import load_profile
+
+    if "profile" in changed:
+        changed["profile"] = load_profile(changed["profile"])
+    assert baked(**changed) == [False, False]
+    assert baked(**changed) == [True, True]
+    assert baked() == [False, False]
+
+
+def test_changed_files_are_made_again(baked: Callable[..., list[bool]], tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    (out / "t0_A.exr").write_bytes(b"somebody else's")
+    assert baked() == [True, False]
+    (out / "t0_D65.exr").unlink()
+    assert baked() == [False, True]
+    os.utime(tmp_path / "t0.npz", ns=(1, 1))
+    assert baked() == [False, False]
+    for damage in ("", "[]", "{", '{"format": "spectral-booth bake", "version": 1, "images": {"t0_A.exr": 3}}'):
+        (out / "t0.bake.json").write_text(damage)
+        assert baked() == [False, False]
+
+
+def test_a_stopped_bake_leaves_nothing_half_written(tmp_path: Path) -> None:
+    (path,) = write_textures(tmp_path, 1)
+
+    def stop(fraction: float, text: str) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        bake(open_texture(path), [Light.builtin("D65")], tmp_path / "out", progress=stop)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_two_textures_of_one_name_are_refused(run: Run, tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        (tmp_path / name).mkdir()
+        write_textures(tmp_path / name, 1)
+    code, _, err = run("bake", tmp_path / "a/t0.npz", tmp_path / "b/t0.npz", "--light", "A", "-o", tmp_path / "out")
+    assert code == 2
+    assert "named like those of" in err
+
+
+def test_leftovers_of_the_dead_are_removed_and_those_of_the_living_kept(tmp_path: Path) -> None:
+    target = tmp_path / "a.exr"
+    with atomic_path(target) as mine:
+        mine.write_text("new")
+        theirs = mine.name.replace(f"-{os.getpid()}.", "-{}.")
+        dead = subprocess.run(
+            [sys.executable, "-c", "import os; print(os.getpid())"], stdout=subprocess.PIPE, check=True
+        )
+        gone = tmp_path / theirs.format(int(dead.stdout))
+        alive = tmp_path / theirs.format(os.getppid())
+        other = tmp_path / theirs.format(int(dead.stdout)).replace(".a.", ".b.")
+        for each in (gone, alive, other):
+            each.write_text("half")
+    with atomic_path(target) as mine:
+        mine.write_text("newer")
+    assert sorted(each.name for each in tmp_path.iterdir()) == sorted([target.name, alive.name, other.name])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL on Windows")
+def test_killed_at_ten_random_moments(tmp_path: Path) -> None:
+    """Every image is whole at any time, and the last run completes the rest and cleans up."""
+    textures, out, lights = write_textures(tmp_path, 4), tmp_path / "out", ("D65", "A", "FL11")
+    options = [part for name in lights for part in ("--light", name)]
+    command = [
+        sys.executable, "-c", "import sys; from spectral_core.cli import main; sys.exit(main(sys.argv[1:]))",
+        "bake", *map(str, textures), *options, "-o", str(out), "--format", "exr",
+    ]  # fmt: skip
+    started = time.perf_counter()
+    subprocess.run([*command, "--again"], check=True, capture_output=True)
+    whole_run = time.perf_counter() - started
+    wanted = {path.name: path.read_bytes() for path in out.glob("*.exr")}
+    assert len(wanted) == len(textures) * len(lights)
+    for path in out.iterdir():
+        path.unlink()
+    moments = random.Random(4)
+    killed = 0
+    for _ in range(10):
+        # The last images are out shortly before the process ends; most of its time goes into starting.
+        wait = moments.uniform(0.3, 1.0) * whole_run
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            process.wait(wait)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGKILL)
+            killed += 1
+            process.wait()
+        found = {path.name: path.read_bytes() for path in out.glob("*.exr")} if out.exists() else {}
+        assert all(wanted[name] == data for name, data in found.items())
+        if len(found) == len(wanted):  # begin anew: what is complete cannot be hurt
+            for path in out.iterdir():
+                path.unlink()
+    assert killed >= 5
+    final = subprocess.run([*command, "--json"], check=True, capture_output=True)
+    assert {path.name: path.read_bytes() for path in out.glob("*.exr")} == wanted
+    assert b'"kept"' in final.stdout
+    records = {f"t{index}.bake.json" for index in range(len(textures))}
+    assert {path.name for path in out.iterdir()} == set(wanted) | records
+    assert oiio().ImageBuf(str(out / "t0_A.exr")).spec().height == SHAPE[0]
