@@ -218,7 +218,7 @@ def calibration(header: EnviHeader, reading: Reading) -> Calibration:
     Raises
     ------
     TextureError
-        If a list has another length, or a good channel a gain that is not positive.
+        If a list has another length, or a good channel a gain that is not positive or an offset beyond 1e12.
     """
     if reading.scale is not None or reading.kind == "counts":
         given = "scale" if reading.scale is not None else "kind 'counts'"
@@ -285,15 +285,20 @@ def _gain_and_dark(header: EnviHeader, prefix: str) -> tuple[Float64Array | None
     if (gain == 1).all() and not offset.any():
         return None, offset
     good = good_channels(header)
-    wrong = np.flatnonzero(good & ~((gain >= SCALE_RANGE[0]) & (gain <= SCALE_RANGE[1])))
-    if len(wrong):
+    _refuse_impossible("gain", gain, good & ~((gain >= SCALE_RANGE[0]) & (gain <= SCALE_RANGE[1])), header)
+    _refuse_impossible("offset", offset, good & (np.abs(offset) > SCALE_RANGE[1]), header)
+    gain = np.where(good, gain, 1.0)
+    return gain, np.where(good, -offset, 0.0) / gain
+
+
+def _refuse_impossible(what: str, values: Float64Array, wrong: BoolArray, header: EnviHeader) -> None:
+    if wrong.any():
+        first = int(np.argmax(wrong))
         raise TextureError(
-            f"the gain {gain[wrong[0]]:g} of {name[:-1]} {wrong[0] + 1} (from 1) is impossible",
+            f"the {what} {values[first]:g} of {channels(header)[1][:-1]} {first + 1} (from 1) is impossible",
             where=header.path,
             remedy="correct it, or call the band bad in 'bbl'",
         )
-    gain = np.where(good, gain, 1.0)
-    return gain, np.where(good, -offset, 0.0) / gain
 
 
 def _named_kind(header: EnviHeader) -> Kind | None:

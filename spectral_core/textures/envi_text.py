@@ -21,7 +21,7 @@ from spectral_core.files import read_bytes
 
 # Names of twenty thousand spectra are a quarter of it.
 _LARGEST_BYTES = 4 * 1024 * 1024
-# Headers have a few dozen; what has more is no header.
+# Headers have a few dozen, and as many comments; what has more is no header.
 _MOST_ENTRIES = 2000
 # No number that means anything is longer; Python's own conversion takes long for millions of digits.
 _LONGEST_NUMBER = 64
@@ -151,7 +151,9 @@ def parse_text(data: bytes, path: Path) -> EnviText:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError:
         text = data.removeprefix(b"\xef\xbb\xbf").decode("latin-1")
-    text = _COMMENT.sub("", text.replace("\r\n", "\n").replace("\r", "\n"))
+    text, comments = _COMMENT.subn("", text.replace("\r\n", "\n").replace("\r", "\n"), _MOST_ENTRIES)
+    if comments == _MOST_ENTRIES:
+        raise _too_long(path)
     return _parsed(text, path)
 
 
@@ -170,7 +172,11 @@ def _parsed(text: str, path: Path) -> EnviText:
         elif entries.setdefault(key, value) != value:
             entries[key] = value
             repeated.append(written)
-    raise TextureError("is far too long for a header", where=path, remedy="give an ENVI header")
+    raise _too_long(path)
+
+
+def _too_long(path: Path) -> TextureError:
+    return TextureError("is far too long for a header", where=path, remedy="give an ENVI header")
 
 
 def shown(text: str) -> str:

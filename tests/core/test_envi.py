@@ -244,6 +244,7 @@ def test_a_missing_unit_is_told(tmp_path: Path, factor: float, unit: str) -> Non
         (["bbl = {0,0,0,0,0,0,0}"], "calls all bands bad"),
         (["bbl = {0,0,0,0,0.5,0,1}"], "other values than 0 and 1"),
         (["data gain values = {1,2,3,4,5,6,0}"], r"the gain 0 of band 7 \(from 1\)"),
+        (["data offset values = {0,1e300,2,3,4,5,6}"], r"the offset 1e\+300 of band 2"),
         (["data gain values = {1,2}"], "2 values for 7 bands"),
         (["data ignore value = none"], "'data ignore value = none' is no number"),
         (["reflectance scale factor = lots"], "is no number"),
