@@ -61,9 +61,7 @@ class EnviTexture(HyperspectralTexture):
         self._calibration = calibration(header, reading)
         # Calibrated values are no integers any more.
         dtype = header.dtype if self._calibration.gain is None else np.dtype(np.float64)
-        self.kind, self.scale = stated_kind(
-            data, reading, dtype, self._calibration.kind, self._calibration.scale
-        )  # fmt: skip
+        self.kind, self.scale = stated_kind(data, reading, dtype, self._calibration.kind, self._calibration.scale)
         self._cube = header.mapped(data)
         self.name = data.stem
         self.height, self.width = header.lines, header.samples

@@ -144,9 +144,8 @@ def _header(text: EnviText) -> EnviHeader:
         raise TextureError(f"has a header offset of {offset}", where=text.path, remedy="give the bytes to skip")
     interleave = _interleave(text, bands)
     file_type = text.text("file type").casefold()
-    return EnviHeader(
-        text, samples, lines, bands, dtype, interleave, offset, file_type, (*text.warnings, *warnings)
-    )  # fmt: skip
+    said = (*text.warnings, *warnings)
+    return EnviHeader(text, samples, lines, bands, dtype, interleave, offset, file_type, said)
 
 
 def _side(text: EnviText, key: str) -> int:

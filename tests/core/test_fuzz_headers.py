@@ -21,7 +21,7 @@ import pytest
 from envi_samples import NM, cube_of, header_lines, listed, write_data, write_library
 from test_fuzz import exr_file, mutate_bytes, mutate_text
 
-from spectral_core.errors import SpectralBoothError
+from spectral_core.errors import SpectralBoothError, TextureError
 from spectral_core.spectra import read_spectra
 from spectral_core.textures import open_texture
 from spectral_core.textures.envi_header import parse_header
@@ -216,6 +216,10 @@ def check_message(error: SpectralBoothError, folder: Path, data: bytes) -> None:
     assert message.isprintable(), what
     assert 10 < len(message) < _LONGEST_MESSAGE, what
     assert error.remedy, what
+
+
+def test_what_files_hold_moves_no_cursor() -> None:
+    assert str(TextureError("has \x1b[2J\n\x00é\udcff", where="a\tb")) == "a b: has ?[2J ?é?"
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
