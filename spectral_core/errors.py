@@ -8,7 +8,8 @@ from pathlib import Path
 class SpectralBoothError(Exception):
     """Base of all expected errors.
 
-    The message is one line, ``where: problem; remedy``, fit to be shown to a user as it is.
+    The message is one line, ``where: problem; remedy``, fit to be shown to a user as it is: what files
+    put into it cannot move a terminal's cursor.
     """
 
     def __init__(self, problem: str, *, where: str | Path | None = None, remedy: str = "") -> None:
@@ -17,7 +18,8 @@ class SpectralBoothError(Exception):
         self.remedy = remedy
         head = f"{self.where}: " if self.where else ""
         tail = f"; {remedy}" if remedy else ""
-        super().__init__(" ".join(f"{head}{problem}{tail}".split()))
+        line = " ".join(f"{head}{problem}{tail}".split())
+        super().__init__(line if line.isprintable() else "".join(c if c.isprintable() else "?" for c in line))
 
 
 class SpectrumError(SpectralBoothError):

@@ -32,6 +32,25 @@ def why_no_file(path: Path) -> str:
         return f"no such file ({error.strerror})"
 
 
+def read_bytes(path: Path, error: type[SpectralBoothError], remedy: str, limit: int) -> bytes:
+    """A whole file of at most `limit` bytes, a multiple of 1 MB.
+
+    Raises
+    ------
+    error
+        With one clear line and the remedy, if it is missing, a folder, unreadable or too large.
+    """
+    try:
+        with path.open("rb") as stream:
+            data = stream.read(limit + 1)
+    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
+        what = f"cannot be read ({problem})" if is_file(path) else why_no_file(path)
+        raise error(what, where=path, remedy=remedy) from None
+    if len(data) > limit:
+        raise error(f"larger than {limit // (1024 * 1024)} MB", where=path, remedy=remedy)
+    return data
+
+
 def read_text(path: Path, error: type[SpectralBoothError], remedy: str) -> str:
     """A text file as UTF-8, byte-order mark dropped.
 
@@ -40,15 +59,7 @@ def read_text(path: Path, error: type[SpectralBoothError], remedy: str) -> str:
     error
         With one clear line and the remedy, if it is missing, a folder, unreadable, too large or no text.
     """
-    limit = _LARGEST_TEXT_MB * 1024 * 1024
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(limit + 1)
-    except (OSError, ValueError) as problem:  # ValueError: a null character in the name
-        what = f"cannot be read ({problem})" if is_file(path) else why_no_file(path)
-        raise error(what, where=path, remedy=remedy) from None
-    if len(data) > limit:
-        raise error(f"larger than {_LARGEST_TEXT_MB} MB", where=path, remedy=remedy)
+    data = read_bytes(path, error, remedy, _LARGEST_TEXT_MB * 1024 * 1024)
     try:
         return data.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError:

@@ -1,4 +1,4 @@
-"""Tables of spectra: SPDs and reflectances, and reading them from CSV."""
+"""Tables of spectra: SPDs and reflectances, and reading them from CSV and ENVI spectral libraries."""
 
 from __future__ import annotations
 
@@ -54,10 +54,11 @@ class Spectra:
 
 
 def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
-    """Read a CSV of spectra: first column nm, one column a spectrum, header optional.
+    """Read a CSV of spectra, or an ENVI spectral library by its header or its data file.
 
-    Comma, semicolon or tab separated; ``#`` starts a comment; ``# kind: lines`` makes every row an
-    exact spectral line. A table from long to short wavelengths is turned round.
+    CSV: first column nm, one column a spectrum, header optional. Comma, semicolon or tab separated;
+    ``#`` starts a comment; ``# kind: lines`` makes every row an exact spectral line. A table from
+    long to short wavelengths is turned round.
 
     Raises
     ------
@@ -65,6 +66,10 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
         With file and line, for anything that is not such a table.
     """
     path = Path(path)
+    from spectral_core import spectral_library  # which needs textures, which may need tables of spectra
+
+    if spectral_library.is_envi(path):
+        return _from_library(path, quantity)
     rows, lines = _rows(path)
     header, body = _split_header(path, rows)
     width = len(_cells(path, *body[0]))
@@ -89,6 +94,21 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
         )
     names = tuple(name.strip() for name in header[1:]) if header else tuple(str(i + 1) for i in range(width - 1))
     return Spectra(names, frozen(wavelengths), frozen(values), header is not None, lines, tuple(warnings))
+
+
+def _from_library(path: Path, quantity: Quantity) -> Spectra:
+    from spectral_core import spectral_library
+
+    library = spectral_library.read_library(path)
+    _check_wavelengths(path, library.wavelengths_nm, needs_curve=True)
+    warnings = _check_values(path, library.wavelengths_nm, library.values, quantity)
+    return Spectra(
+        library.names or tuple(str(index + 1) for index in range(len(library.values))),
+        frozen(library.wavelengths_nm),
+        frozen(library.values),
+        bool(library.names),
+        warnings=(*library.warnings, *warnings),
+    )
 
 
 def write_spectra(

@@ -15,7 +15,7 @@ from spectral_core.files import read_text
 from spectral_core.textures.base import KINDS, Kind, checked_wavelengths
 
 # More than any instrument counts to, and less than any reflectance is scaled down by.
-_SCALE_RANGE = (1e-12, 1e12)
+SCALE_RANGE = (1e-12, 1e12)
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Reading:
     def __post_init__(self) -> None:
         if self.kind is not None and self.kind not in KINDS:
             raise TextureError(f"no kind of texture '{self.kind}'", remedy=f"use one of {', '.join(KINDS[:3])}")
-        if self.scale is not None and not _SCALE_RANGE[0] <= self.scale <= _SCALE_RANGE[1]:
+        if self.scale is not None and not SCALE_RANGE[0] <= self.scale <= SCALE_RANGE[1]:
             raise TextureError(f"scale {self.scale:g} is impossible", remedy="give the stored value of reflectance 1")
         if self.scale is not None and self.kind not in (None, "reflectance"):
             raise TextureError(f"a scale is for reflectance, not for {self.kind}", remedy="give one of the two")
