@@ -14,6 +14,7 @@ from spectral_core.errors import OutputError, SpectralBoothError
 
 # A table of spectra, a scene or a profile is far smaller; what is larger is some other file.
 _LARGEST_TEXT_MB = 64
+_PART = ".part"
 
 
 def is_file(path: Path) -> bool:
@@ -67,8 +68,11 @@ def read_text(path: Path, error: type[SpectralBoothError], remedy: str) -> str:
 
 
 @contextmanager
-def atomic_path(path: str | Path) -> Iterator[Path]:
+def atomic_path(path: str | Path, keep_suffix: bool = True) -> Iterator[Path]:
     """Yield a temporary path beside `path`; rename it to `path` when the block ends without error.
+
+    The temporary name ends as `path` does, for writers that go by it, unless `keep_suffix` is False: then
+    whoever looks for files of that kind meanwhile does not find one that is half written.
 
     Raises
     ------
@@ -85,7 +89,8 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
             )
         target.parent.mkdir(parents=True, exist_ok=True)
         _remove_leftovers(target)
-        handle, name = tempfile.mkstemp(prefix=_prefix(target, os.getpid()), suffix=target.suffix, dir=target.parent)
+        suffix = target.suffix if keep_suffix else _PART
+        handle, name = tempfile.mkstemp(prefix=_prefix(target, os.getpid()), suffix=suffix, dir=target.parent)
         os.close(handle)
     except OSError as error:
         raise OutputError(
@@ -114,7 +119,9 @@ def _remove_leftovers(target: Path) -> None:
     if os.name != "posix":  # elsewhere asking after a process may end it
         return
     # Compared by hand: a name may hold what a pattern would take for a rule.
-    pattern = re.compile(rf"{re.escape(_prefix(target, 0)[:-2])}(\d+)\..*{re.escape(target.suffix)}", re.DOTALL)
+    pattern = re.compile(
+        rf"{re.escape(_prefix(target, 0)[:-2])}(\d+)\..*({re.escape(target.suffix)}|{_PART})", re.DOTALL
+    )
     with suppress(OSError):  # a folder that may be written to but not listed
         for each in target.parent.iterdir():
             match = pattern.fullmatch(each.name)

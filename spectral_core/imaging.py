@@ -67,13 +67,14 @@ class ImageWriter:
 
     def __init__(self, path: Path, width: int, height: int, image_format: ImageFormat, is_srgb: bool = True) -> None:
         self._path = path
-        _, pixel_type = IMAGE_FORMATS[image_format]
+        suffix, pixel_type = IMAGE_FORMATS[image_format]
         spec = oiio().ImageSpec(width, height, 3, pixel_type)
         if is_srgb:
             spec.attribute("oiio:ColorSpace", "Linear" if image_format == "exr" else "sRGB")
         spec.attribute("compression", "zip")
         self._row = 0
-        self._output: Any = oiio().ImageOutput.create(str(path))
+        # By the format and not by the name, which is a temporary one.
+        self._output: Any = oiio().ImageOutput.create(suffix.lstrip("."))
         if self._output is None or not self._output.open(str(path), spec):
             raise OutputError(f"cannot be written ({self._error()})", where=path, remedy="choose another folder")
 

@@ -7,6 +7,7 @@ Dask sends Python objects between its machines: use a scheduler that you trust.
 
 from __future__ import annotations
 
+import socket
 import threading
 from collections import deque
 from collections.abc import Iterator
@@ -24,6 +25,7 @@ from spectral_core.textures import HyperspectralTexture, Reading, open_texture
 # Strips under way for each thread of the cluster: one is computed, the others travel.
 _STRIPS_PER_THREAD = 3
 _CONNECTING_SECONDS = 15
+_DEFAULT_PORT = 8786
 
 
 class Cluster:
@@ -99,7 +101,8 @@ def connected(address: str) -> Iterator[Any]:
             "a cluster needs dask.distributed", remedy="pip install 'spectral-booth[cluster]'"
         ) from None
     try:
-        client = Client(address, timeout=_CONNECTING_SECONDS, set_as_default=False)
+        _check_that_somebody_listens(address)
+        client: Any = Client(address, timeout=_CONNECTING_SECONDS, set_as_default=False)
     except (OSError, ValueError) as error:
         raise ClusterError(
             f"no scheduler answers ({str(error)[:120]})", where=address, remedy="start one with `dask scheduler`"
@@ -110,6 +113,17 @@ def connected(address: str) -> Iterator[Any]:
         yield client
     finally:
         client.close()
+
+
+def _check_that_somebody_listens(address: str) -> None:
+    """Before a client is made: one that finds nobody keeps trying, and can hang when it is given up."""
+    from distributed.comm.addressing import parse_host_port
+
+    scheme, _, place = address.rpartition("://")
+    if scheme not in ("", "tcp", "tls"):
+        raise ValueError(f"{scheme} is neither tcp nor tls")
+    host, port = parse_host_port(place, _DEFAULT_PORT)
+    socket.create_connection((host, port), timeout=_CONNECTING_SECONDS).close()
 
 
 def _bake_part(path: str, reading: Reading, plan: Recipe, strip: Strip) -> BakedStrip:

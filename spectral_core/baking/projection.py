@@ -272,7 +272,8 @@ def _float32(block: Samples, scratch: Float32Array) -> Float32Array:
 
 
 def _refusal(texture: HyperspectralTexture, rule: PixelRule, strip: Strip, first: int, block: Samples) -> TextureError:
-    missing = ~np.isfinite(block.astype(np.float32)) & rule.good
+    with np.errstate(over="ignore", invalid="ignore"):
+        missing = ~np.isfinite(block.astype(np.float32)) & rule.good
     if rule.ignore_value is not None:
         missing |= (block == rule.ignore_value) & rule.good
     row = strip.first + (first + int(np.argmax(missing.any(axis=1)))) // texture.width

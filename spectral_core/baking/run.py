@@ -262,7 +262,7 @@ def _writers(
     Images are written at the same time: most of the work is their compression.
     """
     with ExitStack() as stack:
-        temporaries = [stack.enter_context(atomic_path(path)) for path in paths]
+        temporaries = [stack.enter_context(atomic_path(path, keep_suffix=False)) for path in paths]
         pool = stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
         writers = [
             ImageWriter(temporary, texture.width, texture.height, image_format, is_srgb) for temporary in temporaries
