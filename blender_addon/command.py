@@ -132,9 +132,13 @@ def bake_texture(arguments: argparse.Namespace) -> Result:
     from spectral_core.display import load_profile
     from spectral_core.lights import Light
     from spectral_core.report.documents import bake_document
-    from spectral_core.textures import open_texture
+    from spectral_core.textures import Reading, open_texture
 
-    texture = open_texture(arguments.file)
+    reading = Reading(
+        arguments.kind, arguments.scale, arguments.white, arguments.dark, arguments.wavelengths, arguments.variable,
+        arguments.reduce,
+    )  # fmt: skip
+    texture = open_texture(arguments.file, reading)
     profile = load_profile(arguments.profile)
     result = bake(
         texture,
@@ -144,6 +148,8 @@ def bake_texture(arguments: argparse.Namespace) -> Result:
         image_format=arguments.format,
         levels=tuple(arguments.level or (2,)),
         progress=progress,
+        bad_pixels=arguments.bad_pixels,
+        again=arguments.again,
     )
     return bake_document(result)
 
@@ -195,6 +201,7 @@ def _print(result: Result, path: Path | None) -> None:
 
 def _parser() -> argparse.ArgumentParser:
     from spectral_core.imaging import IMAGE_FORMATS
+    from spectral_core.textures.base import KINDS
 
     parser = _Parser(prog=NAME, description="Spectral Booth inside Blender")
     verbs = parser.add_subparsers(required=True, metavar="VERB")
@@ -230,6 +237,15 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--profile", default="sRGB")
     command.add_argument("--format", choices=sorted(IMAGE_FORMATS), default="exr")
     command.add_argument("--level", type=int, choices=(1, 2), action="append")
+    command.add_argument("--kind", choices=KINDS[:3], help="what the values are, if the file does not say")
+    command.add_argument("--scale", type=float, help="stored value of reflectance 1, if the file does not say")
+    command.add_argument("--white", type=Path, help="capture of a white reference")
+    command.add_argument("--dark", type=Path, help="capture in darkness, with --white")
+    command.add_argument("--wavelengths", help="first:last:step in nm, a list, or a file")
+    command.add_argument("--variable", help="the array in a MATLAB file")
+    command.add_argument("--reduce", action="store_true", help="drop polarisation or fluorescence")
+    command.add_argument("--bad-pixels", choices=("repair", "refuse"), default="repair")
+    command.add_argument("--again", action="store_true", help="also make images that would come out as they are")
     return parser
 
 

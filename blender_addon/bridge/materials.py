@@ -8,9 +8,10 @@ from contextlib import contextmanager
 import bpy
 import numpy as np
 
-from spectral_core.arrays import Float32Array, Float64Array
+from spectral_core.arrays import Float64Array
 from spectral_core.surfaces import Surface
 
+from .images import write_image
 from .state import SURFACE_KEY
 
 DIFFUSE = "Spectral Diffuse"
@@ -59,7 +60,7 @@ def set_colour(material: bpy.types.Material, rgb: Float64Array) -> int:
         socket = material.node_tree.nodes[DIFFUSE].inputs["Color"]
         socket.default_value = (*kept.tolist(), 1.0)
     else:
-        _write_image(material.node_tree.nodes[IMAGE].image, kept.astype(np.float32))
+        write_image(material.node_tree.nodes[IMAGE].image, kept.astype(np.float32))
     return clipped
 
 
@@ -119,15 +120,6 @@ def _add_image_node(material: bpy.types.Material, surface: Surface, diffuse: bpy
     node.location = (-320, 0)
     node.image = image
     material.node_tree.links.new(node.outputs["Color"], diffuse.inputs["Color"])
-
-
-def _write_image(image: bpy.types.Image, pixels: Float32Array) -> None:
-    height, width, _ = pixels.shape
-    rgba = np.ones((height, width, 4), dtype=np.float32)
-    rgba[..., :3] = pixels[::-1]  # Blender's rows run from the bottom
-    image.pixels.foreach_set(rgba.ravel())
-    image.update()
-    image.pack()  # generated pixels are lost on saving otherwise
 
 
 def _add_gloss(material: bpy.types.Material, diffuse: bpy.types.NodeSocket, surface: Surface) -> bpy.types.NodeSocket:

@@ -9,6 +9,7 @@ from .display import AddDisplayGroup, ClearDisplay, SetDisplay
 from .light import CalibrateWhite, SetLevel, SetLight
 from .patches import PlayPatches
 from .render import RenderScene
+from .textures import BakeTexture
 from .verify import VerifyScene
 
 _classes = (
@@ -22,6 +23,7 @@ _classes = (
     ClearDisplay,
     AddDisplayGroup,
     PlayPatches,
+    BakeTexture,
 )
 
 

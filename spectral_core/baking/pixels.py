@@ -10,13 +10,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
 
 from spectral_core.arrays import BoolArray, Float32Array, Float64Array, IntArray
-from spectral_core.textures.base import Samples
+from spectral_core.textures.base import HyperspectralTexture, Samples
 
 BadPixels = Literal["repair", "refuse"]
 TOLERANCE_ABOVE_1 = 0.05
@@ -113,3 +114,18 @@ def interpolated(spectra: Float64Array, missing: BoolArray, wavelengths_nm: Floa
     known = np.where(missing, 0.0, spectra)
     low, high = np.take_along_axis(known, left, axis=1), np.take_along_axis(known, right, axis=1)
     return np.where(missing, low + share * (high - low), spectra)
+
+
+def pixel_warnings(texture: HyperspectralTexture, counts: PixelCounts) -> Iterator[str]:
+    """What the rule for bad pixels did, in words."""
+    pixels = texture.width * texture.height
+    values = pixels * int(texture.good.sum())
+    if counts.repaired:
+        yield f"{counts.repaired} of {pixels} pixels have values that are no numbers: filled in from neighbouring bands"
+    if counts.lost:
+        yield f"{counts.lost} of {pixels} pixels hold no number at all: black"
+    if counts.negative:
+        yield f"{counts.negative / values:.2%} of the values are negative: passed on, as noise about zero"
+    if counts.above:
+        limit = 1 + TOLERANCE_ABOVE_1
+        yield f"{counts.above / values:.2%} of the values are above {limit}: passed on, as brighter than the white"

@@ -18,12 +18,10 @@ from pathlib import Path
 
 import numpy as np
 
-from spectral_core.baking.encoding import Pixels
-from spectral_core.baking.pixels import TOLERANCE_ABOVE_1, BadPixels, PixelCounts
-from spectral_core.baking.products import Product
-from spectral_core.baking.projection import Rows, in_order
+from spectral_core.baking.pixels import BadPixels, PixelCounts, pixel_warnings
+from spectral_core.baking.projection import in_order
 from spectral_core.baking.records import BakedImage, Origin, kept_images, record_path, write_record
-from spectral_core.baking.strips import BakedStrip, Picture, Recipe, bake_rows, recipe
+from spectral_core.baking.strips import BakedStrip, Picture, Recipe, bake_rows, check_reflectance, recipe
 from spectral_core.display import DisplayProfile, srgb
 from spectral_core.errors import OutputError, TextureError
 from spectral_core.files import atomic_path
@@ -120,8 +118,7 @@ def bake(
     OutputError
         If an image cannot be written.
     """
-    if texture.kind != "reflectance":
-        raise _no_reflectance(texture)
+    check_reflectance(texture)
     started, folder, profile = time.perf_counter(), Path(folder), profile or srgb()
     reference = reference or Light.builtin("D65")
     pictures = _pictures(texture.name, lights, levels, folder, image_format)
@@ -151,43 +148,8 @@ def bake(
         bands=texture.bands,
         peak_memory_MB=tally.memory_MB or None,
         counts=tally.counts,
-        warnings=(*texture.warnings, *_warnings(texture, tally.counts)),
+        warnings=(*texture.warnings, *pixel_warnings(texture, tally.counts)),
     )
-
-
-def bake_to_memory(
-    texture: HyperspectralTexture,
-    lights: Sequence[Light],
-    profile: DisplayProfile | None = None,
-    image_format: ImageFormat = "exr",
-    observer: str = DEFAULT_OBSERVER,
-    bad_pixels: BadPixels = "repair",
-) -> tuple[tuple[Pixels, ...], PixelCounts]:
-    """Images (height, width, 3) of `texture`, one per light, as `bake` would write them, and what was wrong.
-
-    ``exr`` gives linear float32, ``png8`` uint8 codes, ``png16`` and ``tiff`` uint16 codes.
-
-    Raises
-    ------
-    TextureError
-        If the texture is not reflectance or damaged.
-    """
-    if texture.kind != "reflectance":
-        raise _no_reflectance(texture)
-    profile, levels = profile or srgb(), LEVELS[image_format]
-    pictures = [Picture(light, 2) for light in lights]
-    plan = recipe(texture, pictures, Light.builtin("D65"), profile, levels, observer, bad_pixels)
-    dtype = np.float32 if levels is None else np.uint8 if levels < 256 else np.uint16
-    images = tuple(np.empty((texture.height, texture.width, 3), dtype=dtype) for _ in lights)
-
-    def one(rows: Rows, product: Product) -> PixelCounts:
-        first, height = rows.strip
-        strip = bake_rows(texture, plan, rows, product)
-        for image, pixels in zip(images, strip.pixels, strict=True):
-            image[first : first + height] = pixels
-        return strip.counts
-
-    return images, sum(in_order(texture, plan.how, one), start=PixelCounts())
 
 
 class _Tally:
@@ -218,20 +180,6 @@ class _Tally:
 def file_name(name: str) -> str:
     """A light's name as part of a file name."""
     return re.sub(r"[^A-Za-z0-9.+-]+", "-", name).strip("-")
-
-
-def _no_reflectance(texture: HyperspectralTexture) -> TextureError:
-    what = {
-        "radiance": "holds radiance, which is already lit",
-        "counts": "holds counts of a camera",
-        "unstated": "does not say whether its values are reflectance",
-    }[texture.kind]
-    remedy = {
-        "radiance": "divide it by the radiance of a white reference (--white)",
-        "counts": "give a white reference (--white), or the count that stands for reflectance 1 (--scale)",
-        "unstated": "say it (--kind reflectance), or give a white reference (--white)",
-    }[texture.kind]
-    return TextureError(f"'{texture.name}' {what}", remedy=remedy)
 
 
 def _pictures(
@@ -276,18 +224,3 @@ def _writers(
             raise
         for writer in writers:
             writer.close()
-
-
-def _warnings(texture: HyperspectralTexture, counts: PixelCounts) -> Iterator[str]:
-    """What the rule for bad pixels did, in words."""
-    pixels = texture.width * texture.height
-    values = pixels * int(texture.good.sum())
-    if counts.repaired:
-        yield f"{counts.repaired} of {pixels} pixels have values that are no numbers: filled in from neighbouring bands"
-    if counts.lost:
-        yield f"{counts.lost} of {pixels} pixels hold no number at all: black"
-    if counts.negative:
-        yield f"{counts.negative / values:.2%} of the values are negative: passed on, as noise about zero"
-    if counts.above:
-        limit = 1 + TOLERANCE_ABOVE_1
-        yield f"{counts.above / values:.2%} of the values are above {limit}: passed on, as brighter than the white"

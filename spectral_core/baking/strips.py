@@ -72,6 +72,29 @@ class BakedStrip:
     project_seconds: float
 
 
+def check_reflectance(texture: HyperspectralTexture) -> None:
+    """Refuse what is no reflectance.
+
+    Raises
+    ------
+    TextureError
+        That says how to make it one.
+    """
+    if texture.kind == "reflectance":
+        return
+    what = {
+        "radiance": "holds radiance, which is already lit",
+        "counts": "holds counts of a camera",
+        "unstated": "does not say whether its values are reflectance",
+    }[texture.kind]
+    remedy = {
+        "radiance": "divide it by the radiance of a white reference (--white)",
+        "counts": "give a white reference (--white), or the count that stands for reflectance 1 (--scale)",
+        "unstated": "say it (--kind reflectance), or give a white reference (--white)",
+    }[texture.kind]
+    raise TextureError(f"'{texture.name}' {what}", remedy=remedy)
+
+
 def recipe(
     texture: HyperspectralTexture,
     pictures: Sequence[Picture],

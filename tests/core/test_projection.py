@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from spectral_core.arrays import Float64Array
-from spectral_core.baking import bake_to_memory, level2_weights, products, project, projection
+from spectral_core.baking import PixelCounts, bake_to_memory, level2_weights, products, project, projection
 from spectral_core.display import load_profile, srgb
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
@@ -197,7 +197,7 @@ def test_codes_are_the_profiles_rounded(name: str, image_format: str, levels: in
     """Where float32 falls on the other side of a half it is one level off: 2e-6 in code is 0.1 level of 16 bits."""
     texture = ArrayTexture(np.random.default_rng(8).uniform(-0.05, 1.2, (40, 40, 41)).astype(np.float32), NM)
     profile = load_profile(name)
-    (image,), _ = bake_to_memory(texture, [LIGHTS[0]], profile, image_format)  # type: ignore[arg-type]
+    (image,) = bake_to_memory(texture, [LIGHTS[0]], profile, image_format).images  # type: ignore[arg-type]
     assert image.dtype == (np.uint8 if levels == 255 else np.uint16)
     XYZ = texture.samples(0, 40).astype(np.float64) @ level2_weights(texture, [LIGHTS[0]])
     codes = levels * np.clip(profile.model.encode(np.clip(profile.to_linear(XYZ), 0, 1)), 0, 1)
@@ -210,10 +210,11 @@ def test_codes_are_the_profiles_rounded(name: str, image_format: str, levels: in
 def test_a_gradient_meets_srgb_at_both_ends_of_its_line() -> None:
     """Greys from black to white, the two pieces of the curve included: never a level off."""
     grey = np.linspace(0, 1, 4096, dtype=np.float32)[None, :, None] * np.ones(41, dtype=np.float32)
-    (image,), counts = bake_to_memory(ArrayTexture(grey, NM), [LIGHTS[0]], image_format="png8")
+    baked = bake_to_memory(ArrayTexture(grey, NM), [LIGHTS[0]], image_format="png8")
+    (image,) = baked.images
     codes = 255 * np.clip(srgb().model.encode(srgb().to_linear(grey[0, :, :1] * LIGHTS[0].XYZ())), 0, 1)
     assert np.abs(image[0] - codes).max() <= 0.5 + 1e-3
-    assert counts == type(counts)()
+    assert baked.counts == PixelCounts()
 
 
 def test_memory_and_files_agree(tmp_path: Path) -> None:
@@ -221,7 +222,7 @@ def test_memory_and_files_agree(tmp_path: Path) -> None:
     from spectral_core.imaging import oiio
 
     texture = ArrayTexture(np.random.default_rng(9).random((30, 20, 41), dtype=np.float32), NM)
-    images, _ = bake_to_memory(texture, LIGHTS, image_format="png8")
+    images = bake_to_memory(texture, LIGHTS, image_format="png8").images
     result = bake(texture, LIGHTS, tmp_path, image_format="png8")
     for image, written in zip(images, result.images, strict=True):
         np.testing.assert_array_equal(oiio().ImageBuf(str(written.path)).get_pixels(oiio().UINT8), image)
