@@ -9,6 +9,7 @@ materials.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,6 +69,14 @@ class Lighting:
     def exact_rgb(self, surface: Surface) -> Float64Array:
         """The surface's exact colour where the perfect diffuser has `luminance`: linear RGB, not clipped."""
         return srgb().to_linear(surface.XYZ(self.light)) * self.luminance
+
+
+def fluorescence_notes(surfaces: Iterable[Surface]) -> list[str]:
+    """A sentence about surfaces that were measured as fluorescent, which only their own lamp shows right."""
+    names = [each.name for each in surfaces if each.texture is not None and each.texture.fluorescent]
+    if not names:
+        return []
+    return [f"{', '.join(names)}: measured as fluorescent; what a lamp excites is left out, another one's too"]
 
 
 def make_lighting(light: Light, level: int, luminance: float) -> Lighting:

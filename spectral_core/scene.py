@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib import resources
 from pathlib import Path
 
 from spectral_core.chart import chart_objects, patch_surfaces
-from spectral_core.errors import LightError, SceneError, SpectrumError
+from spectral_core.errors import LightError, SceneError, SpectrumError, TextureError
 from spectral_core.files import is_file
 from spectral_core.lights import Light
 from spectral_core.scene_reader import TableReader, Vector, parse_toml, read_toml
 from spectral_core.shapes import SHAPES
+from spectral_core.textures.base import KINDS
+from spectral_core.textures.reading import Reading
 
 FORMAT = 1
 LEVELS = (0, 1, 2)
@@ -55,7 +57,10 @@ class Lamp:
 
 @dataclass(frozen=True)
 class SurfaceSource:
-    """Where a surface's reflectance comes from, and its neutral gloss (share of light at normal incidence)."""
+    """Where a surface's reflectance comes from, and its neutral gloss (share of light at normal incidence).
+
+    `reading` is what the scene says of a texture's file.
+    """
 
     name: str
     source: str
@@ -64,6 +69,7 @@ class SurfaceSource:
     constant: float
     gloss: float
     roughness: float
+    reading: Reading = field(default_factory=Reading)
 
 
 @dataclass(frozen=True)
@@ -268,9 +274,27 @@ def _surface(name: str, table: TableReader) -> SurfaceSource:
         constant,
         table.number("gloss", 0.0, 0, 1),
         table.number("roughness", 0.4, 0, 1),
+        _reading(table) if source == "texture" else Reading(),
     )
     table.finish()
     return surface
+
+
+def _reading(table: TableReader) -> Reading:
+    """The same that the command line takes of a texture; file names are relative to the scene's."""
+    white, dark = table.text("white", ""), table.text("dark", "")
+    try:
+        return Reading(
+            kind=table.text("kind", "", ("", *KINDS[:3])) or None,  # type: ignore[arg-type]
+            scale=table.number("scale", 0.0) or None,
+            white=Path(white) if white else None,
+            dark=Path(dark) if dark else None,
+            wavelengths=table.text("wavelengths", "") or None,
+            variable=table.text("variable", "") or None,
+            reduce=table.boolean("reduce", False),
+        )
+    except TextureError as error:
+        raise table.error("texture", f"is described wrongly ({error.problem})", error.remedy) from None
 
 
 def _objects(table: TableReader) -> list[SceneObject]:

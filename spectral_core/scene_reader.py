@@ -65,6 +65,13 @@ class TableReader:
             raise self.error(key, f"is {_shown(value)}", "give a whole number")
         return int(value)
 
+    def boolean(self, key: str, default: bool) -> bool:
+        """True or false."""
+        value = self.take(key, default)
+        if not isinstance(value, bool):
+            raise self.error(key, f"is {_shown(value)}", "give true or false")
+        return value
+
     def vector(self, key: str, default: Any = _REQUIRED, low: float = -1e6, high: float = 1e6) -> Vector:
         """Three finite numbers."""
         value = self.take(key, default)

@@ -107,7 +107,7 @@ def resolve_surface(source: SurfaceSource, folder: Path) -> Surface:
     elif source.source == "file":
         wavelengths, reflectance = _from_library(read_spectra(folder / source.value, "reflectance"), source, folder)
     elif source.source == "texture":
-        texture = open_texture(folder / source.value)
+        texture = open_texture(folder / source.value, source.reading.relative_to(folder))
     else:
         texture = pigment_texture(source.value)
     return Surface(source.name, wavelengths, reflectance, texture, maker, source.gloss, source.roughness)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
 
 from spectral_core.errors import BlenderError
-from spectral_core.lighting import Lighting, make_lighting
+from spectral_core.lighting import Lighting, fluorescence_notes, make_lighting
 from spectral_core.lights import Light
 from spectral_core.scene import SceneDescription, resolve_light
 from spectral_core.surfaces import scene_surfaces
@@ -50,6 +50,8 @@ def apply(scene: bpy.types.Scene, light_name: str, level: int) -> Applied:
         extended[name] = surfaces[name].extended(light) if level == 2 else 0.0
     scene.spectral_booth.light = light_name
     scene.spectral_booth.level = str(level)
+    shown = [surfaces[name] for name in state.managed_materials(scene)]
+    lighting = replace(lighting, notes=(*lighting.notes, *(fluorescence_notes(shown) if level == 2 else ())))
     scene.spectral_booth.notes = "; ".join(lighting.notes)
     return Applied(lighting, clipped, extended)
 

@@ -121,15 +121,13 @@ class BakeTexture(bpy.types.Operator):
             manager.progress_end()
 
     def _store(self, baked: BakedArrays) -> None:
-        from spectral_core.baking.pixels import pixel_warnings
-
         from ..bridge.images import new_image
 
         for light, pixels, clipped in zip(self._lights, baked.images, baked.clipped_fractions, strict=True):
             image = new_image(f"{self._texture.name} under {light.name}", pixels)
             outside = f"; {clipped:.1%} of it outside sRGB" if clipped else ""
             self.report({"INFO"}, f"Image '{image.name}' made{outside}")
-        for warning in (*self._texture.warnings, *pixel_warnings(self._texture, baked.counts)):
+        for warning in baked.warnings:
             self.report({"WARNING"}, warning)
 
     def _end(self, context: bpy.types.Context) -> None:

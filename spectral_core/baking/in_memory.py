@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from spectral_core.baking.dead_bands import without_dead_bands
 from spectral_core.baking.encoding import Pixels
-from spectral_core.baking.pixels import BadPixels, PixelCounts
+from spectral_core.baking.pixels import BadPixels, PixelCounts, pixel_warnings
 from spectral_core.baking.products import Product
 from spectral_core.baking.projection import Rows, in_order
 from spectral_core.baking.strips import BakedStrip, Picture, bake_rows, check_reflectance, recipe
@@ -21,11 +22,12 @@ from spectral_core.textures import HyperspectralTexture
 
 @dataclass(frozen=True)
 class BakedArrays:
-    """Images (height, width, 3), one per light, the share of pixels out of gamut in each, and what was wrong."""
+    """Images (height, width, 3), one per light, the share of pixels out of gamut in each, and warnings."""
 
     images: tuple[Pixels, ...]
     clipped_fractions: tuple[float, ...]
     counts: PixelCounts
+    warnings: tuple[str, ...]
 
 
 def bake_to_memory(
@@ -67,6 +69,7 @@ def baking_steps(
 ) -> Generator[float, None, BakedArrays]:
     """The same a step at a time: yields the fraction done; closing it stops the bake."""
     check_reflectance(texture)
+    texture = without_dead_bands(texture)
     profile, levels = profile or srgb(), LEVELS[image_format]
     pictures = [Picture(light, 2) for light in lights]
     plan = recipe(texture, pictures, Light.builtin("D65"), profile, levels, observer, bad_pixels)
@@ -87,4 +90,4 @@ def baking_steps(
         rows_done += len(strip.pixels[0])
         yield rows_done / texture.height
     shares = outside / (texture.width * texture.height)
-    return BakedArrays(images, tuple(shares.tolist()), counts)
+    return BakedArrays(images, tuple(shares.tolist()), counts, (*texture.warnings, *pixel_warnings(texture, counts)))

@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from spectral_core.baking.dead_bands import without_dead_bands
 from spectral_core.baking.pixels import BadPixels, PixelCounts, pixel_warnings
 from spectral_core.baking.projection import in_order
 from spectral_core.baking.records import BakedImage, Origin, kept_images, record_path, write_record
@@ -119,6 +120,7 @@ def bake(
         If an image cannot be written.
     """
     check_reflectance(texture)
+    texture = without_dead_bands(texture)
     started, folder, profile = time.perf_counter(), Path(folder), profile or srgb()
     reference = reference or Light.builtin("D65")
     pictures = _pictures(texture.name, lights, levels, folder, image_format)
@@ -148,7 +150,7 @@ def bake(
         bands=texture.bands,
         peak_memory_MB=tally.memory_MB or None,
         counts=tally.counts,
-        warnings=(*texture.warnings, *pixel_warnings(texture, tally.counts)),
+        warnings=(*texture.warnings, *_of_fluorescence(texture, lights), *pixel_warnings(texture, tally.counts)),
     )
 
 
@@ -194,6 +196,13 @@ def _pictures(
     if len(pictures) < len(levels) * len(lights):
         raise OutputError("two lights would be written to one file", where=folder, remedy="give each light once")
     return pictures
+
+
+def _of_fluorescence(texture: HyperspectralTexture, lights: Sequence[Light]) -> list[str]:
+    if not texture.fluorescent:
+        return []
+    names = ", ".join(light.name for light in lights)
+    return [f"'{texture.name}' was measured as fluorescent: what {names} would excite in it is left out"]
 
 
 def _here(texture: HyperspectralTexture, plan: Recipe) -> Iterator[BakedStrip]:

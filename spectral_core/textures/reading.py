@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from spectral_core.arrays import Float64Array
 from spectral_core.errors import TextureError
-from spectral_core.files import read_text
+from spectral_core.files import is_file, read_text
 from spectral_core.textures.base import KINDS, Kind, checked_wavelengths
 
 # More than any instrument counts to, and less than any reflectance is scaled down by.
@@ -61,6 +61,18 @@ class Reading:
             raise TextureError(
                 "a white reference is for radiance or counts, not for reflectance", remedy="leave it or the scale out"
             )
+
+    def relative_to(self, folder: Path) -> Reading:
+        """The same with its files relative to a folder."""
+        wavelengths = self.wavelengths
+        if wavelengths is not None and is_file(folder / wavelengths):
+            wavelengths = str(folder / wavelengths)
+        return replace(
+            self,
+            white=self.white and folder / self.white,
+            dark=self.dark and folder / self.dark,
+            wavelengths=wavelengths,
+        )
 
 
 def stated_kind(

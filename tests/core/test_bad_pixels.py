@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
-from spectral_core.baking import PixelCounts, bake, level2_weights, project
+from spectral_core.baking import PixelCounts, bake, bake_to_memory, level2_weights, project
 from spectral_core.baking.pixels import interpolated
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
@@ -114,3 +114,37 @@ def test_values_too_large_to_add_up_are_refused() -> None:
     cube = np.full((3, 4, 31), 3e38, dtype=np.float32)
     with pytest.raises(TextureError, match="too large"):
         project(ArrayTexture(cube, NM), 1e3 * level2_weights(ArrayTexture(cube, NM), D65))
+
+
+def alive(dtype: str, scale: float) -> np.ndarray:
+    """A smooth capture with noise."""
+    rng = np.random.default_rng(2)
+    smooth = 0.5 + 0.3 * np.sin(np.linspace(0, 3, 31) + rng.uniform(0, 3, (40, 30, 1)))
+    return np.asarray((scale * (smooth + rng.normal(0, 0.002, smooth.shape))).astype(dtype))
+
+
+@pytest.mark.parametrize(("dtype", "scale"), [("f4", 1.0), ("u2", 4000.0), ("u1", 250.0)])
+def test_dead_bands_are_found_named_and_left_out(dtype: str, scale: float, tmp_path: Path) -> None:
+    cube = alive(dtype, scale)
+    whole = bake_to_memory(ArrayTexture(cube, NM, scale=scale), D65)
+    assert whole.warnings == ()
+    broken = cube.copy()
+    broken[..., 12] = 0
+    broken[..., [20, 21]] = np.nan if dtype == "f4" else np.iinfo(dtype).max
+    mended = bake_to_memory(ArrayTexture(broken, NM, scale=scale), D65)
+    assert any("520, 600, 610 nm" in warning for warning in mended.warnings)
+    assert mended.counts == PixelCounts()
+    # The spline over a gap of 30 nm in a smooth spectrum with 0.2 % (or 1/250) of noise.
+    np.testing.assert_allclose(mended.images[0], whole.images[0], rtol=0, atol=0.01)
+    result = bake(ArrayTexture(broken, NM, scale=scale), D65, tmp_path)
+    assert any("dead bands" in warning for warning in result.warnings)
+
+
+def test_what_is_black_or_of_one_colour_is_not_dead() -> None:
+    """Nothing but zeros; a uniform grey; an end without signal beside an end without signal."""
+    for cube in (np.zeros((20, 20, 31), np.float32), np.full((20, 20, 31), 0.3, np.float32)):
+        assert bake_to_memory(ArrayTexture(cube, NM), D65).warnings == ()
+    dark_end = alive("f4", 1.0)
+    dark_end[..., :4] = [0.0, 0.0, 0.0, 0.004]
+    dark_end[..., 3] += np.random.default_rng(3).normal(0, 1e-3, (40, 30)).clip(0)
+    assert not any("dead" in warning for warning in bake_to_memory(ArrayTexture(dark_end, NM), D65).warnings)

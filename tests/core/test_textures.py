@@ -8,7 +8,7 @@ import pytest
 
 from spectral_core.baking import bake
 from spectral_core.display import load_profile, srgb, srgb_encode
-from spectral_core.errors import OutputError, TextureError
+from spectral_core.errors import OutputError, SceneError, TextureError
 from spectral_core.imaging import oiio
 from spectral_core.lights import Light
 from spectral_core.textures import open_texture
@@ -154,3 +154,25 @@ def test_emission_is_radiance(tmp_path: Path) -> None:
 
 def test_the_core_never_imports_bpy() -> None:
     assert sys.modules["bpy"] is None
+
+
+def test_a_scene_says_how_its_textures_are_read(tmp_path: Path) -> None:
+    """A capture of counts over a white, with names relative to the scene."""
+    from spectral_core.scene import load_scene
+    from spectral_core.surfaces import scene_surfaces
+
+    rng = np.random.default_rng(1)
+    counts = rng.integers(0, 1000, (4, 5, 3)).astype(np.float32)
+    np.savez(tmp_path / "leaf.npz", reflectance=counts, wavelengths_nm=[450, 550, 650])
+    text = (Path(__file__).parents[2] / "blend_scenes" / "colorchecker.toml").read_text(encoding="utf-8")
+    path = tmp_path / "scene.toml"
+    path.write_text(f'{text}\n[surfaces.leaf]\ntexture = "leaf.npz"\nscale = 1000\n', encoding="utf-8")
+    surface = scene_surfaces(load_scene(path))["leaf"]
+    assert surface.texture is not None
+    np.testing.assert_allclose(surface.texture.rows(0, 4), counts / 1000, rtol=1e-6)
+    path.write_text(f'{text}\n[surfaces.leaf]\ntexture = "leaf.npz"\ndark = "dark.npz"\n', encoding="utf-8")
+    with pytest.raises(SceneError, match=r"surfaces\.leaf\.texture.*needs a white one"):
+        load_scene(path)
+    path.write_text(f'{text}\n[surfaces.leaf]\ntexture = "leaf.npz"\nreduce = 1\n', encoding="utf-8")
+    with pytest.raises(SceneError, match="true or false"):
+        load_scene(path)

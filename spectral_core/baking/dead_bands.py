@@ -1,0 +1,97 @@
+"""Bands that say nothing although their neighbours do: found before a bake, left out, and named.
+
+A dead band would pass for a black line, or a bright one, in every spectrum. Where it is left out,
+the weights' spline bridges it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spectral_core.arrays import BoolArray, Float64Array
+from spectral_core.textures.base import HyperspectralTexture, Samples
+
+_ROWS = 16
+# Enough pixels that no living band has the same value in all of them.
+_FEWEST_PIXELS = 64
+# A neighbour carries a signal if it is at least this bright on average: darker surfaces than 1 % hardly exist.
+_SIGNAL = 0.01
+
+
+def without_dead_bands(texture: HyperspectralTexture) -> HyperspectralTexture:
+    """The texture itself, or with its dead bands marked as bad and named in its warnings.
+
+    Looked for in mapped files and arrays only, in a few rows; in others that would mean reading them twice.
+    """
+    if not texture.concurrent or texture.height * texture.width < _FEWEST_PIXELS:
+        return texture
+    dead = dead_bands(texture)
+    if not dead.any():
+        return texture
+    named = ", ".join(f"{nm:g}" for nm in texture.wavelengths_nm[dead][:8])
+    more = f" and {dead.sum() - 8} more" if dead.sum() > 8 else ""
+    return WithoutBands(texture, dead, f"dead bands left out: {named}{more} nm, the same value in all of some rows")
+
+
+def dead_bands(texture: HyperspectralTexture) -> BoolArray:
+    """(bands,): good bands that are stuck at zero, at no number or at their type's end beside a band with signal."""
+    rows = np.unique(np.linspace(0, texture.height - 1, _ROWS).astype(int))
+    stored = np.concatenate([texture.samples(int(row), 1)[0] for row in rows])
+    values = np.concatenate([texture.rows(int(row), 1)[0] for row in rows])
+    with np.errstate(invalid="ignore"):
+        stuck = (np.isnan(values) | (values == values[0])).all(axis=0) & (
+            np.isnan(values).all(axis=0) | _at_end(stored)
+        )
+        bright = ~stuck & texture.good & (np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0).mean(axis=0) > _SIGNAL)
+    order = np.argsort(texture.wavelengths_nm)
+    beside = np.zeros(texture.bands, dtype=bool)
+    living = ~stuck[order]
+    for at in np.flatnonzero(~living):
+        near = [np.flatnonzero(living[:at])[-1:], at + 1 + np.flatnonzero(living[at + 1 :])[:1]]
+        beside[order[at]] = bool(bright[order[np.concatenate(near)]].any())
+    return np.asarray(stuck & beside & texture.good)
+
+
+def _at_end(stored: Samples) -> BoolArray:
+    """(bands,): whether the first pixel holds 0 or an integer type's largest value."""
+    first = stored[0]
+    if stored.dtype.kind in "iu":
+        return np.asarray((first == 0) | (first == np.iinfo(stored.dtype).max))
+    return np.asarray(first == 0)
+
+
+class WithoutBands(HyperspectralTexture):
+    """A texture with some of its bands marked as bad."""
+
+    def __init__(self, texture: HyperspectralTexture, bad: BoolArray, warning: str) -> None:
+        self._texture = texture
+        self._bad = bad
+        for name in (
+            "name", "format", "height", "width", "wavelengths_nm", "kind", "scale", "ignore_value", "fluorescent",
+            "concurrent", "files",
+        ):  # fmt: skip
+            setattr(self, name, getattr(texture, name))
+        self.warnings = (*texture.warnings, warning)
+
+    def samples(self, first: int, count: int) -> Samples:
+        """`count` rows from `first` on as they are stored: (count, width, bands)."""
+        return self._texture.samples(first, count)
+
+    def rows_per_tile(self) -> int:
+        """As the texture's."""
+        return self._texture.rows_per_tile()
+
+    @property
+    def gain(self) -> Float64Array:
+        """As the texture's."""
+        return self._texture.gain
+
+    @property
+    def dark(self) -> Float64Array:
+        """As the texture's."""
+        return self._texture.dark
+
+    @property
+    def good(self) -> BoolArray:
+        """(bands,): good in the texture, and not among the bad."""
+        return self._texture.good & ~self._bad
