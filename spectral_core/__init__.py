@@ -10,40 +10,50 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from spectral_core.baking import bake
+    from spectral_core.baking import bake, bake_to_memory, level2_weights, project
     from spectral_core.display import DisplayProfile, load_profile
     from spectral_core.lights import Light
     from spectral_core.scene import load_scene
     from spectral_core.spectra import Spectra, read_spectra
-    from spectral_core.textures import HyperspectralTexture, open_texture
+    from spectral_core.textures import ArrayTexture, HyperspectralTexture, Reading, open_texture
     from spectral_core.weights import WeightingFactors, weighting_factors
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "ArrayTexture": "textures",
     "DisplayProfile": "display",
     "HyperspectralTexture": "textures",
     "Light": "lights",
+    "Reading": "textures",
     "Spectra": "spectra",
     "WeightingFactors": "weights",
     "bake": "baking",
+    "bake_to_memory": "baking",
+    "level2_weights": "baking",
     "load_profile": "display",
     "load_scene": "scene",
     "open_texture": "textures",
+    "project": "baking",
     "read_spectra": "spectra",
     "weighting_factors": "weights",
 }
 
 __all__ = [
+    "ArrayTexture",
     "DisplayProfile",
     "HyperspectralTexture",
     "Light",
+    "Reading",
     "Spectra",
     "WeightingFactors",
     "bake",
+    "bake_to_memory",
+    "level2_weights",
     "load_profile",
     "load_scene",
     "open_texture",
+    "project",
     "read_spectra",
     "weighting_factors",
 ]

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from spectral_core.arrays import Float32Array, Float64Array
 from spectral_core.display import DisplayProfile, SRGBCurve
 from spectral_core.display.models.matrix import GammaMatrix
-from spectral_core.display.profile import GAMUT_TOLERANCE, in_gamut
+from spectral_core.display.profile import GAMUT_TOLERANCE
 
 Pixels = npt.NDArray[Any]
 
@@ -40,6 +40,11 @@ class Encoding:
     profile: DisplayProfile
     levels: int | None
 
+    @property
+    def dtype(self) -> npt.DTypeLike:
+        """Of the pixels."""
+        return np.float32 if self.levels is None else np.uint8 if self.levels < 256 else np.uint16
+
     def linear_part(self) -> tuple[Float64Array, Float64Array] | None:
         """Matrix (3, 3) and offset (3,) of ``linear = XYZ @ matrix + offset``, None if it is no such thing."""
         values = self.profile.to_linear(_PROBES)
@@ -57,7 +62,7 @@ class Encoding:
         codes = self._codes(linear)
         codes *= np.float32(self.levels)
         codes += np.float32(0.5)
-        return codes.astype(np.uint8 if self.levels < 256 else np.uint16)
+        return codes.astype(self.dtype)
 
     def _codes(self, linear: Float32Array) -> Float32Array:
         """Clipped codes; in float32 where they are powers, 2e-7 of white: a hundredth of a 16-bit step."""
@@ -78,6 +83,7 @@ class Encoding:
 
 def count_outside(linear: Float32Array) -> int:
     """How many of the colours (n, 3) are out of gamut."""
-    if linear.min() >= -GAMUT_TOLERANCE and linear.max() <= 1 + GAMUT_TOLERANCE:
-        return 0
-    return int((~in_gamut(linear)).sum())
+    outside = linear < -GAMUT_TOLERANCE
+    outside |= linear > 1 + GAMUT_TOLERANCE
+    # Ten times as fast as `any` over an axis of three.
+    return int(np.count_nonzero(outside[:, 0] | outside[:, 1] | outside[:, 2]))

@@ -73,8 +73,7 @@ def baking_steps(
     profile, levels = profile or srgb(), LEVELS[image_format]
     pictures = [Picture(light, 2) for light in lights]
     plan = recipe(texture, pictures, Light.builtin("D65"), profile, levels, observer, bad_pixels)
-    dtype = np.float32 if levels is None else np.uint8 if levels < 256 else np.uint16
-    images = tuple(np.empty((texture.height, texture.width, 3), dtype=dtype) for _ in lights)
+    images = tuple(np.empty((texture.height, texture.width, 3), dtype=plan.encoding.dtype) for _ in lights)
     outside, counts, rows_done = np.zeros(len(lights)), PixelCounts(), 0
 
     def one(rows: Rows, product: Product) -> BakedStrip:

@@ -20,6 +20,8 @@ from spectral_core.textures import HyperspectralTexture
 
 # Beyond it images of half floats would hold infinity.
 _LARGEST_HALF = 65504.0
+# Pixels encoded at a time: what is in between is small enough for the allocator to keep.
+_BLOCK = 8192
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,14 +149,24 @@ def bake_rows(texture: HyperspectralTexture, recipe: Recipe, rows: Rows, product
     values = np.empty((height * texture.width, recipe.how.columns), dtype=np.float32)
     counts = project_rows(texture, recipe.how, rows, product, values, recipe.bad_pixels)
     linear = _linear(texture, recipe, first, values)
-    pixels, outside = [], np.zeros(len(recipe.pictures), dtype=np.int64)
-    for index, (source, factor) in enumerate(zip(recipe.sources, recipe.factors, strict=True)):
-        colours = np.ascontiguousarray(linear[:, source])
-        if recipe.pictures[index].level == 1:
-            colours *= factor
-        outside[index] = count_outside(colours)
-        pixels.append(recipe.encoding.pixels(colours).reshape(height, texture.width, 3))
-    return BakedStrip(tuple(pixels), outside, counts, rows.seconds, time.perf_counter() - started)
+    pixels = [np.empty((len(linear), 3), recipe.encoding.dtype) for _ in recipe.pictures]
+    outside = np.zeros(len(recipe.pictures), dtype=np.int64)
+    for start in range(0, len(linear), _BLOCK):
+        block = linear[start : start + _BLOCK]
+        for index, picture in enumerate(recipe.pictures):
+            # Twice as fast as a copy of the slice.
+            colours: Float32Array = np.take(block, recipe.sources[index], axis=1)
+            if picture.level == 1:
+                colours *= recipe.factors[index]
+            outside[index] += count_outside(colours)
+            pixels[index][start : start + _BLOCK] = recipe.encoding.pixels(colours)
+    return BakedStrip(
+        tuple(each.reshape(height, texture.width, 3) for each in pixels),
+        outside,
+        counts,
+        rows.seconds,
+        time.perf_counter() - started,
+    )
 
 
 def _linear(texture: HyperspectralTexture, recipe: Recipe, first: int, values: Float32Array) -> Float32Array:

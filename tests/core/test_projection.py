@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 
 from spectral_core.arrays import Float64Array
 from spectral_core.baking import PixelCounts, bake_to_memory, level2_weights, products, project, projection
+from spectral_core.baking.encoding import count_outside
 from spectral_core.display import load_profile, srgb
+from spectral_core.display.profile import in_gamut
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
 from spectral_core.textures import ArrayTexture
@@ -226,3 +228,11 @@ def test_memory_and_files_agree(tmp_path: Path) -> None:
     result = bake(texture, LIGHTS, tmp_path, image_format="png8")
     for image, written in zip(images, result.images, strict=True):
         np.testing.assert_array_equal(oiio().ImageBuf(str(written.path)).get_pixels(oiio().UINT8), image)
+
+
+def test_colours_out_of_gamut_are_counted_as_the_profile_does() -> None:
+    linear = np.random.default_rng(10).uniform(-0.2, 1.3, (5000, 3)).astype(np.float32)
+    linear[:4] = [[0, 1, 0.5], [-5e-5, 1.00005, 0], [-2e-4, 0.5, 0.5], [0.5, 0.5, 1.0002]]
+    assert count_outside(linear) == int((~in_gamut(linear)).sum())
+    assert count_outside(linear[:2]) == 0
+    assert count_outside(linear[2:4]) == 2
