@@ -7,7 +7,10 @@ from pathlib import Path
 from spectral_core.errors import TextureError
 from spectral_core.files import is_file, why_no_file
 from spectral_core.textures.base import HyperspectralTexture
+from spectral_core.textures.image_sequence import ImageSequence, is_sequence, single_image
+from spectral_core.textures.multiband_tiff import MultibandTiff
 from spectral_core.textures.numpy_format import NpyTexture, NpzTexture
+from spectral_core.textures.raster import PICTURES, TIFFS
 from spectral_core.textures.reading import Reading
 from spectral_core.textures.spectral_exr import SpectralExrTexture
 
@@ -15,11 +18,13 @@ _FORMATS = (
     (b"\x93NUMPY", NpyTexture),
     (b"PK\x03\x04", NpzTexture),
     (b"\x76\x2f\x31\x01", SpectralExrTexture),
+    *((signature, MultibandTiff) for signature in TIFFS),
 )
 
 
 def open_texture(path: str | Path, reading: Reading | None = None) -> HyperspectralTexture:
-    """Open a hyperspectral texture: ``.npy`` with its wavelengths beside it, ``.npz``, spectral OpenEXR.
+    """Open a hyperspectral texture: ``.npy`` with its wavelengths beside it, ``.npz``, spectral OpenEXR,
+    multi-band TIFF, or a folder or pattern (``capture/*.bmp``) of one image per wavelength.
 
     Raises
     ------
@@ -28,6 +33,8 @@ def open_texture(path: str | Path, reading: Reading | None = None) -> Hyperspect
     """
     path = Path(path)
     if not is_file(path):
+        if is_sequence(path):
+            return ImageSequence(path, reading or Reading())
         raise TextureError(why_no_file(path), where=path, remedy="name a texture file")
     try:
         with path.open("rb") as stream:
@@ -37,5 +44,9 @@ def open_texture(path: str | Path, reading: Reading | None = None) -> Hyperspect
     for signature, texture in _FORMATS:
         if head.startswith(signature):
             return texture(path, reading or Reading())
+    if head.startswith(PICTURES):
+        raise single_image(path)
     what = "is empty" if not head else "is no texture of a known format"
-    raise TextureError(what, where=path, remedy="give .npy, .npz or spectral OpenEXR")
+    raise TextureError(
+        what, where=path, remedy="give .npy, .npz, spectral OpenEXR, multi-band TIFF or a folder of images"
+    )

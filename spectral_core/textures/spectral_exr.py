@@ -7,7 +7,6 @@ reduced to what it can if the reading says so.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +17,13 @@ from spectral_core.errors import TextureError
 from spectral_core.imaging import error_text, oiio
 from spectral_core.textures.base import HyperspectralTexture, Samples, checked_size, checked_wavelengths
 from spectral_core.textures.exr_channels import SpectralChannels, spectral_channels
+from spectral_core.textures.raster import check_promise, library_attribute
 from spectral_core.textures.reading import Reading, stated_kind
 
 # Stereo, layers and levels of a renderer; more is damage.
 _MOST_PARTS = 1000
+# Bispectral files hold half the square of their bands.
+_MOST_CHANNELS = 1 << 16
 
 
 class SpectralExrTexture(HyperspectralTexture):
@@ -31,11 +33,13 @@ class SpectralExrTexture(HyperspectralTexture):
 
     def __init__(self, path: Path, reading: Reading) -> None:
         self._path = path
-        with _quiet_reader():
+        # The older reader, the default before OpenImageIO 3.1, prints its own lines on damaged files.
+        with library_attribute("openexr:core", 1), library_attribute("limits:channels", _MOST_CHANNELS):
             self._input = oiio().ImageInput.open(str(path))
-        if self._input is None:
-            raise TextureError(f"is not an OpenEXR image ({error_text(oiio())})", where=path, remedy="write it again")
-        self._specs = self._parts()
+            if self._input is None:
+                what = f"is not an OpenEXR image ({error_text(oiio())})"
+                raise TextureError(what, where=path, remedy="write it again")
+            self._specs = self._parts()
         channels = spectral_channels([_names(spec, path) for spec in self._specs], path)
         self._spec = self._common_spec(channels)
         # Names have six decimals: what the unit's conversion adds beyond them is noise.
@@ -62,6 +66,7 @@ class SpectralExrTexture(HyperspectralTexture):
         while len(specs) < _MOST_PARTS and self._input.seek_subimage(len(specs), 0):
             specs.append(self._input.spec())
         error_text(self._input)  # that there is no further part is no error
+        self._input.seek_subimage(0, 0)
         return specs
 
     def _common_spec(self, channels: SpectralChannels) -> Any:
@@ -78,6 +83,8 @@ class SpectralExrTexture(HyperspectralTexture):
                 remedy="write all spectral channels with one data window",
             )
         checked_size(int(specs[0].width), int(specs[0].height), self._path)
+        for spec in specs:
+            check_promise(spec, 4, self._path)
         return specs[0]
 
     def _leave_out(self, channels: SpectralChannels, reduce: bool) -> None:
@@ -137,11 +144,13 @@ class SpectralExrTexture(HyperspectralTexture):
         begin, end = first, first + count
         if tile:
             begin, end = first // tile * tile, min(self.height, -(-end // tile) * tile)
-            pixels = self._input.read_tiles(
-                part, 0, spec.x, spec.x + self.width, spec.y + begin, spec.y + end, 0, 1, low, high, "float"
-            )
-        else:
-            pixels = self._input.read_scanlines(part, 0, spec.y + begin, spec.y + end, 0, low, high, "float")
+        top, bottom = spec.y + begin, spec.y + end
+        with library_attribute("limits:channels", _MOST_CHANNELS):  # looked up again with each part
+            if tile:
+                columns = (spec.x, spec.x + self.width)
+                pixels = self._input.read_tiles(part, 0, *columns, top, bottom, 0, 1, low, high, "float")
+            else:
+                pixels = self._input.read_scanlines(part, 0, top, bottom, 0, low, high, "float")
         if pixels is None:
             raise TextureError(
                 f"row {first} cannot be read ({error_text(self._input)})",
@@ -164,17 +173,3 @@ def _names(spec: Any, path: Path) -> tuple[str, ...]:
         return tuple(spec.channelnames)
     except UnicodeDecodeError:
         raise TextureError("has damaged channel names", where=path, remedy="write it again") from None
-
-
-@contextmanager
-def _quiet_reader() -> Iterator[None]:
-    """OpenImageIO's newer reader of OpenEXR, which opens what is opened in this block.
-
-    The older one, the default before OpenImageIO 3.1, prints its own lines on damaged files.
-    """
-    before = oiio().get_int_attribute("openexr:core", 0)
-    oiio().attribute("openexr:core", 1)
-    try:
-        yield
-    finally:
-        oiio().attribute("openexr:core", before)

@@ -121,6 +121,17 @@ def test_fluorescence_alone_is_no_texture(tmp_path: Path) -> None:
         open_texture(tmp_path / "f.exr", Reading(reduce=True))
 
 
+def test_more_channels_than_openimageio_opens_by_default(tmp_path: Path) -> None:
+    """50 bands with all pairs below the diagonal are 1275 channels; 1024 is the library's limit."""
+    bands = range(400, 900, 10)
+    names = [f"T.{nm},0nm" for nm in bands] + [f"T.{i},0nm.{o},0nm" for i in bands for o in bands if o > i]
+    values = np.ones((2, 2, len(names)), np.float32)
+    write_parts(tmp_path / "f.exr", [(names, values)])
+    texture = open_texture(tmp_path / "f.exr", Reading(reduce=True))
+    assert (len(names), texture.bands, texture.fluorescent) == (1275, 50, True)
+    assert texture.rows(0, 2).min() == 1
+
+
 def test_the_user_says_what_it_is(tmp_path: Path) -> None:
     path, values = tmp_path / "x.exr", cube(1)
     write_parts(path, [(["S0.450,0nm"], values)])
