@@ -8,6 +8,7 @@ from spectral_core.errors import TextureError
 from spectral_core.files import is_file, why_no_file
 from spectral_core.textures.base import HyperspectralTexture
 from spectral_core.textures.image_sequence import ImageSequence, is_sequence, single_image
+from spectral_core.textures.matlab import MatlabTexture
 from spectral_core.textures.multiband_tiff import MultibandTiff
 from spectral_core.textures.numpy_format import NpyTexture, NpzTexture
 from spectral_core.textures.raster import PICTURES, TIFFS
@@ -18,13 +19,16 @@ _FORMATS = (
     (b"\x93NUMPY", NpyTexture),
     (b"PK\x03\x04", NpzTexture),
     (b"\x76\x2f\x31\x01", SpectralExrTexture),
+    (b"MATLAB 5", MatlabTexture),
+    (b"MATLAB 7", MatlabTexture),
+    (b"\x89HDF\r\n\x1a\n", MatlabTexture),
     *((signature, MultibandTiff) for signature in TIFFS),
 )
 
 
 def open_texture(path: str | Path, reading: Reading | None = None) -> HyperspectralTexture:
     """Open a hyperspectral texture: ``.npy`` with its wavelengths beside it, ``.npz``, spectral OpenEXR,
-    multi-band TIFF, or a folder or pattern (``capture/*.bmp``) of one image per wavelength.
+    multi-band TIFF, MATLAB, or a folder or pattern (``capture/*.bmp``) of one image per wavelength.
 
     Raises
     ------
@@ -48,5 +52,5 @@ def open_texture(path: str | Path, reading: Reading | None = None) -> Hyperspect
         raise single_image(path)
     what = "is empty" if not head else "is no texture of a known format"
     raise TextureError(
-        what, where=path, remedy="give .npy, .npz, spectral OpenEXR, multi-band TIFF or a folder of images"
+        what, where=path, remedy="give .npy, .npz, spectral OpenEXR, multi-band TIFF, MATLAB or a folder of images"
     )
