@@ -13,6 +13,7 @@ from spectral_core.textures.multiband_tiff import MultibandTiff
 from spectral_core.textures.numpy_format import NpyTexture, NpzTexture
 from spectral_core.textures.raster import PICTURES, TIFFS
 from spectral_core.textures.reading import Reading
+from spectral_core.textures.references import calibrated
 from spectral_core.textures.spectral_exr import SpectralExrTexture
 
 _FORMATS = (
@@ -30,15 +31,27 @@ def open_texture(path: str | Path, reading: Reading | None = None) -> Hyperspect
     """Open a hyperspectral texture: ``.npy`` with its wavelengths beside it, ``.npz``, spectral OpenEXR,
     multi-band TIFF, MATLAB, or a folder or pattern (``capture/*.bmp``) of one image per wavelength.
 
+    With a white reference in `reading` it becomes reflectance.
+
     Raises
     ------
     TextureError
-        If the file is missing, of an unknown format, damaged, or not a texture of spectra.
+        If the file is missing, of an unknown format, damaged, or not a texture of spectra; also if a
+        reference does not fit.
+    SpectrumError
+        If a reference is a table that cannot be used.
+    MissingExtraError
+        If the format needs a package that is not installed.
     """
-    path = Path(path)
+    reading = reading or Reading()
+    return calibrated(_opened(Path(path), reading), reading, open_texture)
+
+
+def _opened(path: Path, reading: Reading) -> HyperspectralTexture:
+    """The texture as its file has it."""
     if not is_file(path):
         if is_sequence(path):
-            return ImageSequence(path, reading or Reading())
+            return ImageSequence(path, reading)
         raise TextureError(why_no_file(path), where=path, remedy="name a texture file")
     try:
         with path.open("rb") as stream:
@@ -47,7 +60,7 @@ def open_texture(path: str | Path, reading: Reading | None = None) -> Hyperspect
         raise TextureError(f"cannot be read ({error.strerror})", where=path, remedy="check its permissions") from None
     for signature, texture in _FORMATS:
         if head.startswith(signature):
-            return texture(path, reading or Reading())
+            return texture(path, reading)
     if head.startswith(PICTURES):
         raise single_image(path)
     what = "is empty" if not head else "is no texture of a known format"
