@@ -12,7 +12,7 @@ import math
 import struct
 import zlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
 
@@ -22,6 +22,7 @@ from spectral_core.arrays import Float64Array
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import Samples
 from spectral_core.textures.matlab_file import Variable
+from spectral_core.textures.matlab_stream import DamagedError, ElementStream
 
 _HEADER_BYTES = 128
 # Data types of elements.
@@ -41,13 +42,6 @@ _MOST_ARRAYS = 10_000
 _DEEPEST = 16
 _MOST_DIMENSIONS = 32
 _LONGEST_NAMES = 1 << 16
-# Deflate packs nothing more densely.
-_LARGEST_RATIO = 1032
-_PIECE = 1 << 18
-
-
-class _DamagedError(Exception):
-    """What is not as the format says."""
 
 
 @dataclass(frozen=True)
@@ -82,10 +76,10 @@ class Mat5File:
             with path.open("rb") as stream:
                 self._order = _byte_order(stream.read(_HEADER_BYTES))
                 for start, size, compressed in _elements(stream, self._order, path.stat().st_size):
-                    source = _Source(stream, start, size, compressed)
+                    source = ElementStream(stream, start, size, compressed)
                     walk = _Walk(source, self._order, self._places)
                     walk.array("", 0)
-        except (_DamagedError, zlib.error, struct.error, OSError) as error:
+        except (DamagedError, zlib.error, struct.error, OSError) as error:
             raise self._damaged(error) from None
         self.variables = tuple(self._places)
 
@@ -106,11 +100,11 @@ class Mat5File:
             return np.memmap(self._path, place.dtype, "r", place.offset, variable.shape, order="F")
         try:
             with self._path.open("rb") as stream:
-                source = _Source(stream, place.start, place.size, compressed=True)
+                source = ElementStream(stream, place.start, place.size, compressed=True)
                 source.skip_to(place.offset)
                 values = source.numbers(math.prod(variable.shape), place.dtype)
                 source.finish()
-        except (_DamagedError, zlib.error, OSError, MemoryError) as error:
+        except (DamagedError, zlib.error, OSError, MemoryError) as error:
             raise self._damaged(error) from None
         return values.reshape(variable.shape, order="F")
 
@@ -125,7 +119,7 @@ class Mat5File:
 def _byte_order(header: bytes) -> str:
     order = {b"IM": "<", b"MI": ">"}.get(header[126:128])
     if order is None:
-        raise _DamagedError("its header does not say its byte order")
+        raise DamagedError("its header does not say its byte order")
     return order
 
 
@@ -136,9 +130,9 @@ def _elements(stream: IO[bytes], order: str, file_size: int) -> Iterator[tuple[i
         stream.seek(at)
         kind, size = struct.unpack(f"{order}II", stream.read(8))
         if kind not in (_MATRIX, _COMPRESSED):
-            raise _DamagedError(f"an element of type {kind} at byte {at}")
+            raise DamagedError(f"an element of type {kind} at byte {at}")
         if at + 8 + size > file_size:
-            raise _DamagedError(f"the element at byte {at} ends beyond the file: it is cut short")
+            raise DamagedError(f"the element at byte {at} ends beyond the file: it is cut short")
         if kind == _COMPRESSED:
             yield at + 8, size, True
         else:
@@ -147,92 +141,10 @@ def _elements(stream: IO[bytes], order: str, file_size: int) -> Iterator[tuple[i
 
 
 @dataclass
-class _Source:
-    """The bytes of an element one after the other; positions are those of the file, or of what is inflated."""
-
-    stream: IO[bytes]
-    start: int
-    size: int
-    compressed: bool
-    at: int = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.stream.seek(self.start)
-        self.at = 0 if self.compressed else self.start
-        # No more can be promised than can be inflated.
-        self.end = self.at + self.size * (_LARGEST_RATIO if self.compressed else 1)
-        self._inflate = zlib.decompressobj()
-        self._packed = self.size
-
-    def read(self, count: int) -> bytes:
-        """Exactly `count` bytes."""
-        if self.at + count > self.end:
-            raise _DamagedError(f"{count:,} bytes promised where there cannot be so many")
-        result = b"".join(self._pieces(count))
-        if len(result) < count:
-            raise _DamagedError("the data ends early")
-        return result
-
-    def skip_to(self, position: int) -> None:
-        """Go on at a later position."""
-        if not self.at <= position <= self.end:
-            raise _DamagedError("an array longer than its element")
-        if self.compressed:
-            wanted = position - self.at
-            if sum(len(piece) for piece in self._pieces(wanted)) < wanted:
-                raise _DamagedError("the data ends early")
-        else:
-            self.stream.seek(position)
-            self.at = position
-
-    def numbers(self, count: int, dtype: np.dtype[Any]) -> Samples:
-        """`count` numbers; only what the file really holds is ever written to."""
-        size = count * dtype.itemsize
-        if self.at + size > self.end:
-            raise _DamagedError(f"{size:,} bytes promised where there cannot be so many")
-        result = np.empty(size, np.uint8)
-        filled = 0
-        for piece in self._pieces(size):
-            result[filled : filled + len(piece)] = np.frombuffer(piece, np.uint8)
-            filled += len(piece)
-        if filled < size:
-            raise _DamagedError("the data ends early")
-        return result.view(dtype)
-
-    def finish(self) -> None:
-        """Inflate what is left, at whose end the checksum is compared."""
-        for _ in self._pieces(self.end - self.at):
-            pass
-        if not self._inflate.eof:
-            raise _DamagedError("the compressed data ends early")
-
-    def _pieces(self, count: int) -> Iterator[bytes]:
-        """At most `count` bytes in pieces, fewer at the end."""
-        while count > 0:
-            piece = self._inflated(min(count, _PIECE)) if self.compressed else self.stream.read(min(count, _PIECE))
-            if not piece:
-                return
-            self.at += len(piece)
-            count -= len(piece)
-            yield piece
-
-    def _inflated(self, most: int) -> bytes:
-        while not self._inflate.eof:
-            packed = self._inflate.unconsumed_tail
-            if not packed:
-                packed = self.stream.read(min(_PIECE, self._packed))
-                self._packed -= len(packed)
-            piece = self._inflate.decompress(packed, most)
-            if piece or not packed:
-                return piece
-        return b""
-
-
-@dataclass
 class _Walk:
     """Goes through the headers of one variable and notes its numeric arrays in `places`."""
 
-    source: _Source
+    source: ElementStream
     order: str
     places: dict[Variable, _Place]
 
@@ -240,10 +152,10 @@ class _Walk:
         """An array element, all of it: `name` is that of the struct's field, empty for a variable."""
         kind, size, inline = self._tag()
         if kind != _MATRIX or inline is not None:
-            raise _DamagedError(f"an element of type {kind} instead of an array")
+            raise DamagedError(f"an element of type {kind} instead of an array")
         end = self.source.at + size
         if end > self.source.end or depth > _DEEPEST:
-            raise _DamagedError("an array longer than its element")
+            raise DamagedError("an array longer than its element")
         if size:
             self._content(name, end, depth)
         if depth:  # what follows a variable is another one
@@ -257,7 +169,7 @@ class _Walk:
         dimensions = self._data(_DIMENSIONS, 4 * _MOST_DIMENSIONS)
         shape = struct.unpack(f"{self.order}{len(dimensions) // 4}i", dimensions)
         if len(shape) < 2 or min(shape) < 0:
-            raise _DamagedError(f"an array of shape {shape}")
+            raise DamagedError(f"an array of shape {shape}")
         own_name = self._data(_NAMES, _LONGEST_NAMES).decode("ascii", "replace")
         name = name or own_name
         if not name:  # what functions and objects of the file refer to
@@ -272,7 +184,7 @@ class _Walk:
         (length,) = struct.unpack(f"{self.order}i", self._data(_DIMENSIONS, 4, exactly=True))
         names = self._data(_NAMES, _LONGEST_NAMES)
         if length < 1:
-            raise _DamagedError(f"names of {length} characters")
+            raise DamagedError(f"names of {length} characters")
         fields = [
             names[at : at + length].split(b"\0")[0].decode("ascii", "replace") for at in range(0, len(names), length)
         ]
@@ -286,15 +198,15 @@ class _Walk:
     def _numbers(self, variable: Variable) -> None:
         kind, size, inline = self._tag()
         if kind not in _TYPES:
-            raise _DamagedError(f"numbers of type {kind}")
+            raise DamagedError(f"numbers of type {kind}")
         dtype = np.dtype(self.order + _TYPES[kind])
         if size != math.prod(variable.shape) * dtype.itemsize:
-            raise _DamagedError(f"'{variable.name[:40]}' of shape {variable.shape} in {size:,} bytes")
+            raise DamagedError(f"'{variable.name[:40]}' of shape {variable.shape} in {size:,} bytes")
         source = self.source
         if source.at + (0 if inline else size) > source.end:
-            raise _DamagedError(f"{size:,} bytes promised where there cannot be so many")
+            raise DamagedError(f"{size:,} bytes promised where there cannot be so many")
         if len(self.places) >= _MOST_ARRAYS:
-            raise _DamagedError(f"more than {_MOST_ARRAYS} arrays")
+            raise DamagedError(f"more than {_MOST_ARRAYS} arrays")
         self.places[variable] = _Place(source.start, source.size, source.compressed, source.at, dtype, inline)
 
     def _tag(self) -> tuple[int, int, bytes | None]:
@@ -304,13 +216,13 @@ class _Walk:
         if kind >> 16 == 0:
             return kind, size, None
         if kind >> 16 > 4:
-            raise _DamagedError("a small element of more than four bytes")
+            raise DamagedError("a small element of more than four bytes")
         return kind & 0xFFFF, kind >> 16, raw[4 : 4 + (kind >> 16)]
 
     def _data(self, kinds: tuple[int, ...], most: int, exactly: bool = False) -> bytes:
         """The data of the next element, which must be of one of these types and `most` bytes long at most."""
         found, size, inline = self._tag()
         if found not in kinds or size > most or (exactly and size != most):
-            raise _DamagedError(f"an element of type {found} and {size:,} bytes in a header")
+            raise DamagedError(f"an element of type {found} and {size:,} bytes in a header")
         # Elements begin at multiples of eight.
         return inline if inline is not None else self.source.read(size + -size % 8)[:size]

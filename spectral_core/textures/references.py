@@ -245,9 +245,10 @@ def _warnings(texture: HyperspectralTexture, usable: BoolArray, replaced: int) -
     warnings: tuple[str, ...] = ("reflectance is relative to the white reference, whose own is taken as 1",)
     bad = texture.wavelengths_nm[~usable & texture.good]
     if bad.size:
+        where = f"{bad.min():g} nm" if bad.size == 1 else f"among {bad.min():g} to {bad.max():g} nm"
         warnings += (
-            f"{bad.size} of {texture.bands} bands are left out, {bad.min():g} to {bad.max():g} nm: a reference is "
-            "saturated there, or the white not brighter than the dark",
+            f"{bad.size} of {texture.bands} bands left out ({where}): a reference is saturated there, or the white "
+            "not brighter than the dark",
         )
     if replaced:
         warnings += (f"{replaced} columns of the white reference, over all bands, are replaced by their band's mean",)

@@ -55,7 +55,8 @@ def test_columns_have_their_own_white_and_dark(scene: dict[str, Any]) -> None:
     assert texture.good.all()
     np.testing.assert_array_equal(texture.samples(3, 4), values["counts"][3:7])  # as stored
     exact = quotient(values["counts"].astype(float), values["white"].mean(axis=0), values["dark"].mean(axis=0))
-    # float32: counts below 2**15 less a dark signal, so half a step of 2**-9 in 2000 counts at least.
+    # float32: half a step of 2**-9 of counts up to 30000 less their dark signal, against 2000 counts at least,
+    # and three roundings of a reflectance up to 0.9.
     np.testing.assert_allclose(whole(texture), exact, rtol=0, atol=2e-6)
     # The noise of 50 and 40 rows and of rounding, against 2000 counts: four standard deviations.
     np.testing.assert_allclose(whole(texture), values["reflectance"], rtol=0, atol=4 * 20 / 50**0.5 / 2000)
@@ -92,8 +93,7 @@ def test_saturated_columns_take_the_band_s_mean(scene: dict[str, Any]) -> None:
     texture = open_texture(scene["counts"], Reading(white=save(folder / "s.npz", white), dark=scene["dark"]))
     np.testing.assert_array_equal(texture.good, [True, True, True, True, False, True])
     assert texture.warnings[1:] == (
-        "1 of 6 bands are left out, 600 to 600 nm: a reference is saturated there, or the white not brighter than "
-        "the dark",
+        "1 of 6 bands left out (600 nm): a reference is saturated there, or the white not brighter than the dark",
         "3 columns of the white reference, over all bands, are replaced by their band's mean",
     )
     dark = values["dark"].mean(axis=0)
