@@ -132,19 +132,29 @@ def image_rows(image: Any, path: Path, subimage: int, first: int, count: int, ch
         If they cannot be read.
     """
     spec = image.spec(subimage)
-    low, high = channels
-    begin, end = spec.y + first, spec.y + first + count
-    if spec.tile_height:
-        pixels = _tiled(image, spec, subimage, first, count, channels)
-    else:
-        pixels = image.read_scanlines(subimage, 0, begin, end, 0, low, high, spec.format)
+    pixels = (_tiled if spec.tile_height else _scanlines)(image, spec, subimage, first, count, channels)
     if pixels is None or image.has_error:  # a JPEG that is cut short is filled up with grey
         raise TextureError(
             f"rows from {first} on cannot be read ({error_text(image)})",
             where=path,
-            remedy="the file is damaged; write it again",
+            remedy="the file is damaged, or packed as OpenImageIO cannot unpack; write it again",
         )
-    return np.asarray(pixels).reshape(count, spec.width, high - low)
+    return np.asarray(pixels).reshape(count, spec.width, channels[1] - channels[0])
+
+
+def _scanlines(image: Any, spec: Any, subimage: int, first: int, count: int, channels: tuple[int, int]) -> Any:
+    """Rows of an image that is stored in rows or strips."""
+    begin = spec.y + first
+    # OpenImageIO unpacks strips of deflate itself, and before 3.1 keeps to itself what fails; not so single rows.
+    is_deflate = spec.get_string_attribute("compression") == "zip"
+    step = 1 if is_deflate and spec.get_string_attribute("planarconfig") == "contig" else count
+    blocks = [
+        image.read_scanlines(subimage, 0, row, row + step, 0, *channels, spec.format)
+        for row in range(begin, begin + count, step)
+    ]
+    if any(block is None for block in blocks):
+        return None
+    return blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
 
 
 def _tiled(image: Any, spec: Any, subimage: int, first: int, count: int, channels: tuple[int, int]) -> Any:

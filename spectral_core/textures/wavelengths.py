@@ -17,7 +17,7 @@ from spectral_core.textures.base import checked_wavelengths
 _NANOMETRES = (100.0, 5000.0)
 _MICROMETRES = (0.1, 5.0)
 _LONGEST_TEXT = 1 << 20
-_LIST = re.compile(r"\bwavelengths?(?:_nm)?\s*[=:]\s*[\{\[]([^\}\]]*)[\}\]]", re.IGNORECASE)
+_LIST = re.compile(r"\bwavelengths?(?:_nm)?\s*[=:]\s*[\{\[]([^\{\}\[\]]*)[\}\]]", re.IGNORECASE)
 _KEY = re.compile(r"wavelengths?([ _]?\(?nm\)?)?", re.IGNORECASE)
 _NUMBER = re.compile(r"\d+(?:[.,]\d+)?")
 # 450_5 may be 450.5.
