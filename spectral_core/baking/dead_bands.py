@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from spectral_core.arrays import BoolArray, Float64Array
+from spectral_core.arrays import BoolArray
 from spectral_core.textures.base import HyperspectralTexture, Samples
+from spectral_core.textures.derived import DerivedTexture
 
 _ROWS = 16
 # Enough pixels that no living band has the same value in all of them.
@@ -60,36 +61,13 @@ def _at_end(stored: Samples) -> BoolArray:
     return np.asarray(first == 0)
 
 
-class WithoutBands(HyperspectralTexture):
+class WithoutBands(DerivedTexture):
     """A texture with some of its bands marked as bad."""
 
     def __init__(self, texture: HyperspectralTexture, bad: BoolArray, warning: str) -> None:
-        self._texture = texture
+        super().__init__(texture)
         self._bad = bad
-        for name in (
-            "name", "format", "height", "width", "wavelengths_nm", "kind", "scale", "ignore_value", "fluorescent",
-            "concurrent", "files",
-        ):  # fmt: skip
-            setattr(self, name, getattr(texture, name))
         self.warnings = (*texture.warnings, warning)
-
-    def samples(self, first: int, count: int) -> Samples:
-        """`count` rows from `first` on as they are stored: (count, width, bands)."""
-        return self._texture.samples(first, count)
-
-    def rows_per_tile(self) -> int:
-        """As the texture's."""
-        return self._texture.rows_per_tile()
-
-    @property
-    def gain(self) -> Float64Array:
-        """As the texture's."""
-        return self._texture.gain
-
-    @property
-    def dark(self) -> Float64Array:
-        """As the texture's."""
-        return self._texture.dark
 
     @property
     def good(self) -> BoolArray:

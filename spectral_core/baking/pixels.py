@@ -61,7 +61,9 @@ class PixelRule:
     @property
     def highest(self) -> Float64Array:
         """(bands,): largest stored values that are not counted."""
-        return np.asarray(self.dark + (1 + TOLERANCE_ABOVE_1) / self.gain)
+        # Bad bands may have no gain at all.
+        span = np.divide(1 + TOLERANCE_ABOVE_1, self.gain, out=np.full(self.gain.shape, np.inf), where=self.gain > 0)
+        return np.asarray(self.dark + span)
 
     def is_clean(self, stored: Samples) -> bool:
         """Whether nothing of a block (pixels, bands) needs the rule, seen from its extremes."""

@@ -88,7 +88,9 @@ def stated_kind(
     TextureError
         If integers are called reflectance without saying which integer is 1.
     """
-    kind, scale = reading.kind or kind, reading.scale or scale
+    if reading.kind is not None or reading.scale is not None:
+        kind = reading.kind or "reflectance"
+    scale = reading.scale or scale
     if scale is not None and kind is None:
         kind = "reflectance"
     if kind is None:

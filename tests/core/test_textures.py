@@ -139,7 +139,7 @@ def test_a_failed_bake_leaves_what_was_there(tmp_path: Path, cube: np.ndarray) -
     ],
 )
 def test_exr_files_that_cannot_be_shown(tmp_path: Path, names: list[str], message: str) -> None:
-    write_exr(tmp_path / "x.exr", np.zeros((4, 4, 3), np.float32), names)
+    write_exr(tmp_path / "x.exr", np.ones((4, 4, 3), np.float32), names)
     with pytest.raises(TextureError, match=message):
         open_texture(tmp_path / "x.exr")
 
