@@ -9,7 +9,7 @@ import numpy as np
 
 from spectral_core.arrays import BoolArray, Float64Array
 from spectral_core.errors import SpectrumError, TextureError
-from spectral_core.textures.envi_channels import (
+from spectral_core.textures.envi.channels import (
     calibration,
     good_channels,
     ignore_value,
@@ -19,8 +19,8 @@ from spectral_core.textures.envi_channels import (
     refuse_repeated,
     wavelengths_nm,
 )
-from spectral_core.textures.envi_files import header_and_data, header_beside, is_header
-from spectral_core.textures.envi_header import EnviHeader, read_header
+from spectral_core.textures.envi.files import header_and_data, header_beside, is_header
+from spectral_core.textures.envi.header import EnviHeader, read_header
 from spectral_core.textures.reading import Reading
 
 # As many as a table in CSV may have.

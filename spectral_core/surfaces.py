@@ -20,7 +20,7 @@ from spectral_core.scene import SceneDescription, SurfaceSource
 from spectral_core.spectra import Spectra, read_spectra
 from spectral_core.standards import DEFAULT_OBSERVER
 from spectral_core.textures import HyperspectralTexture, open_texture
-from spectral_core.textures.pigments import pigment_texture
+from spectral_core.textures.synthetic.pigments import pigment_texture
 
 # A constant reflectance needs two bands to say so.
 _CONSTANT_GRID_NM = (380.0, 780.0)

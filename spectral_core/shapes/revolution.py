@@ -1,7 +1,7 @@
 """Smooth shapes swept round an axis, with the UVs of a globe.
 
 u runs round the axis and v from the lower pole (0) to the upper (1), so that a texture made for
-the sphere (see `spectral_core.textures.pigments`) fits them all. Vertices along the seam are
+the sphere (see `spectral_core.textures.synthetic.pigments`) fits them all. Vertices along the seam are
 shared: normals run on across it, only the UVs of its corners differ.
 """
 

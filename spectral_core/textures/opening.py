@@ -8,17 +8,17 @@ from pathlib import Path
 from spectral_core.errors import TextureError
 from spectral_core.files import is_file, why_no_file
 from spectral_core.textures.base import HyperspectralTexture
-from spectral_core.textures.envi import EnviTexture
-from spectral_core.textures.envi_files import header_beside
-from spectral_core.textures.envi_text import begins_header
-from spectral_core.textures.image_sequence import ImageSequence, is_sequence, single_image
-from spectral_core.textures.matlab import MatlabTexture
-from spectral_core.textures.multiband_tiff import MultibandTiff
+from spectral_core.textures.envi.files import header_beside
+from spectral_core.textures.envi.text import begins_header
+from spectral_core.textures.envi.texture import EnviTexture
+from spectral_core.textures.images.multiband_tiff import MultibandTiff
+from spectral_core.textures.images.raster import PICTURES, TIFFS
+from spectral_core.textures.images.sequence import ImageSequence, is_sequence, single_image
+from spectral_core.textures.images.spectral_exr import SpectralExrTexture
+from spectral_core.textures.matlab.texture import MatlabTexture
 from spectral_core.textures.numpy_format import NpyTexture, NpzTexture
-from spectral_core.textures.raster import PICTURES, TIFFS
 from spectral_core.textures.reading import Reading
 from spectral_core.textures.references import calibrated
-from spectral_core.textures.spectral_exr import SpectralExrTexture
 
 _FORMATS: tuple[tuple[bytes, Callable[[Path, Reading], HyperspectralTexture]], ...] = (
     (b"\x93NUMPY", NpyTexture),

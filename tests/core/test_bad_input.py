@@ -235,7 +235,7 @@ def test_counts_taken_for_reflectance(run: Run, tmp_path: Path) -> None:
 def test_pickles_are_never_loaded(run: Run, tmp_path: Path) -> None:
     path = tmp_path / "cube.npz"
     np.savez(path, reflectance=np.array([[["x", None]]], dtype=object), wavelengths_nm=np.array([400.0, 500.0]))
-    refused(run("texture", "info", path), "not floating point")
+    refused(run("texture", "info", path), "not real numbers")
 
 
 def test_pixels_outside(run: Run, tmp_path: Path) -> None:

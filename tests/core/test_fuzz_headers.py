@@ -24,7 +24,7 @@ from test_fuzz import exr_file, mutate_bytes, mutate_text
 from spectral_core.errors import SpectralBoothError, TextureError
 from spectral_core.spectra import read_spectra
 from spectral_core.textures import open_texture
-from spectral_core.textures.envi_header import parse_header
+from spectral_core.textures.envi.header import parse_header
 
 # More than any reader needs beside what the process holds already; a hostile header promises terabytes.
 _MEMORY_BYTES = 512 * 1024 * 1024

@@ -72,8 +72,8 @@ def test_the_published_system_s_sequence(tmp_path: Path) -> None:
 
 def test_more_images_than_may_be_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In blocks of 8 rows, so that images beyond the limit are opened again for each."""
-    monkeypatch.setattr("spectral_core.textures.image_sequence._MOST_OPEN", 2)
-    monkeypatch.setattr("spectral_core.textures.image_sequence._LARGE_BLOCK_BYTES", 8 * 13 * 5)
+    monkeypatch.setattr("spectral_core.textures.images.sequence._MOST_OPEN", 2)
+    monkeypatch.setattr("spectral_core.textures.images.sequence._LARGE_BLOCK_BYTES", 8 * 13 * 5)
     values = cube("uint8")
     texture = open_texture(write_sequence(tmp_path / "c", values, [f"{nm}nm.png" for nm in range(400, 500, 20)]))
     rows = [texture.samples(first, min(3, 37 - first)) for first in range(0, 37, 3)]

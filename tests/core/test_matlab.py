@@ -279,7 +279,7 @@ def test_version_5_needs_no_other_package(tmp_path: Path, monkeypatch: pytest.Mo
 def test_whole_chunks_are_unpacked_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Chunks of 5 rows, tiles of 3, blocks of two chunks."""
     row_bytes = 7 * 9 * 2
-    monkeypatch.setattr("spectral_core.textures.row_buffer.block_rows.__defaults__", (10 * row_bytes,))
+    monkeypatch.setattr("spectral_core.textures.images.row_buffer.block_rows.__defaults__", (10 * row_bytes,))
     save_v73(tmp_path / "t.mat", {"cube": cube(), "wl": NM})
     texture = open_texture(tmp_path / "t.mat")
     buffer = texture._rows.__self__

@@ -10,8 +10,14 @@ from spectral_core.arrays import Float32Array
 from spectral_core.baking import level2_weights
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
-from spectral_core.textures.pigments import PIGMENT_TEXTURES, PIGMENTS, WAVELENGTHS_NM, kubelka_munk, pigment_texture
-from spectral_core.textures.skin import directions, spots
+from spectral_core.textures.synthetic.pigments import (
+    PIGMENT_TEXTURES,
+    PIGMENTS,
+    WAVELENGTHS_NM,
+    kubelka_munk,
+    pigment_texture,
+)
+from spectral_core.textures.synthetic.skin import directions, spots
 
 # L*, C*ab and hue angle under D65. Mean of the whole skin; ranges hold what is called by that
 # name: yellow near 90 degrees, orange near 65, ripe tomato 25 to 45, green apple 105 to 125.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from spectral_core.errors import TextureError
 from spectral_core.files import is_file
-from spectral_core.textures.envi_text import begins_header
+from spectral_core.textures.envi.text import begins_header
 
 # What ENVI, its users' software and makers of cameras call the data file of NAME.hdr.
 _DATA_SUFFIXES = (

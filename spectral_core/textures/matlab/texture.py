@@ -14,9 +14,9 @@ import numpy as np
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import HyperspectralTexture, Kind, Samples, checked_wavelengths
-from spectral_core.textures.matlab_file import MatFile, Variable
-from spectral_core.textures.matlab_hdf5 import Mat73File
-from spectral_core.textures.matlab_v5 import Mat5File
+from spectral_core.textures.matlab.file import MatFile, Variable
+from spectral_core.textures.matlab.hdf5 import Mat73File
+from spectral_core.textures.matlab.v5 import Mat5File
 from spectral_core.textures.reading import Reading, stated_kind, stated_wavelengths
 from spectral_core.textures.wavelengths import as_nanometres, ask_for_wavelengths
 from spectral_core.weights import LARGEST_BANDS

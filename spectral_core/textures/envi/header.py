@@ -10,7 +10,7 @@ import numpy as np
 
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import LARGEST_SIDE, Samples
-from spectral_core.textures.envi_text import EnviText, parse_text, read_text_of_header, shown
+from spectral_core.textures.envi.text import EnviText, parse_text, read_text_of_header, shown
 
 Interleave = Literal["bsq", "bil", "bip"]
 _TYPES = {1: "u1", 2: "i2", 3: "i4", 4: "f4", 5: "f8", 12: "u2", 13: "u4", 14: "i8", 15: "u8"}

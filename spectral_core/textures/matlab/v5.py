@@ -21,8 +21,8 @@ import numpy as np
 from spectral_core.arrays import Float64Array
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import Samples
-from spectral_core.textures.matlab_file import Variable
-from spectral_core.textures.matlab_stream import DamagedError, ElementStream
+from spectral_core.textures.matlab.file import Variable
+from spectral_core.textures.matlab.stream import DamagedError, ElementStream
 
 _HEADER_BYTES = 128
 # Data types of elements.

@@ -19,9 +19,9 @@ import numpy as np
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import HyperspectralTexture, Samples, checked_wavelengths
-from spectral_core.textures.raster import image_rows, open_image, stored_type
+from spectral_core.textures.images.raster import image_rows, open_image, stored_type
+from spectral_core.textures.images.row_buffer import BLOCK_BYTES, RowBuffer, block_rows
 from spectral_core.textures.reading import Reading, stated_kind, stated_wavelengths
-from spectral_core.textures.row_buffer import BLOCK_BYTES, RowBuffer, block_rows
 from spectral_core.textures.wavelengths import ask_for_wavelengths, wavelengths_in_names
 from spectral_core.weights import LARGEST_BANDS
 

@@ -14,11 +14,11 @@ from spectral_core.arrays import Float64Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.imaging import error_text
 from spectral_core.textures.base import HyperspectralTexture, Samples, checked_wavelengths
-from spectral_core.textures.image_sequence import single_image
-from spectral_core.textures.raster import image_rows, library_attribute, open_image, stored_type
+from spectral_core.textures.images.raster import image_rows, library_attribute, open_image, stored_type
+from spectral_core.textures.images.row_buffer import RowBuffer, block_rows
+from spectral_core.textures.images.sequence import single_image
+from spectral_core.textures.images.tiff_layout import mapped, tiff_directories, tiff_layout
 from spectral_core.textures.reading import Reading, stated_kind, stated_wavelengths
-from spectral_core.textures.row_buffer import RowBuffer, block_rows
-from spectral_core.textures.tiff_layout import mapped, tiff_directories, tiff_layout
 from spectral_core.textures.wavelengths import ask_for_wavelengths, wavelengths_in_text
 from spectral_core.weights import LARGEST_BANDS
 

@@ -15,8 +15,8 @@ import numpy as np
 from spectral_core.arrays import BoolArray, Float64Array
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import Kind
-from spectral_core.textures.envi_header import EnviHeader
-from spectral_core.textures.envi_text import shown
+from spectral_core.textures.envi.header import EnviHeader
+from spectral_core.textures.envi.text import shown
 from spectral_core.textures.reading import SCALE_RANGE, Reading
 
 # In air or vacuum, whatever the writer meant: they differ by 0.03 per cent.

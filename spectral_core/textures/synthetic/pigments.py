@@ -19,7 +19,7 @@ import numpy as np
 from spectral_core.arrays import Float32Array, Float64Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import HyperspectralTexture, Kind, Samples
-from spectral_core.textures.skin import directions, mottle, spots
+from spectral_core.textures.synthetic.skin import directions, mottle, spots
 
 HEIGHT, WIDTH = 256, 512
 # Share of light that the rough cuticle sends back before it meets a pigment, without colour

@@ -13,7 +13,7 @@ import numpy as np
 from spectral_core.errors import TextureError
 from spectral_core.imaging import error_text, oiio
 from spectral_core.textures.base import Samples, checked_size
-from spectral_core.textures.tiff_layout import tiff_directories
+from spectral_core.textures.images.tiff_layout import tiff_directories
 from spectral_core.weights import LARGEST_BANDS
 
 PICTURES = (b"\x89PNG", b"BM", b"\xff\xd8\xff")

@@ -16,8 +16,8 @@ from spectral_core.arrays import frozen
 from spectral_core.errors import TextureError
 from spectral_core.imaging import error_text, oiio
 from spectral_core.textures.base import HyperspectralTexture, Samples, checked_size, checked_wavelengths
-from spectral_core.textures.exr_channels import SpectralChannels, spectral_channels
-from spectral_core.textures.raster import check_promise, library_attribute
+from spectral_core.textures.images.exr_channels import SpectralChannels, spectral_channels
+from spectral_core.textures.images.raster import check_promise, library_attribute
 from spectral_core.textures.reading import Reading, stated_kind
 
 # Stereo, layers and levels of a renderer; more is damage.

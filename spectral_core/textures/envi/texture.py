@@ -9,7 +9,7 @@ import numpy as np
 from spectral_core.arrays import BoolArray, Float64Array, frozen
 from spectral_core.errors import TextureError
 from spectral_core.textures.base import HyperspectralTexture, Samples, checked_size, checked_wavelengths
-from spectral_core.textures.envi_channels import (
+from spectral_core.textures.envi.channels import (
     calibration,
     good_channels,
     ignore_value,
@@ -18,8 +18,8 @@ from spectral_core.textures.envi_channels import (
     refuse_repeated,
     wavelengths_nm,
 )
-from spectral_core.textures.envi_files import header_and_data
-from spectral_core.textures.envi_header import EnviHeader, read_header
+from spectral_core.textures.envi.files import header_and_data
+from spectral_core.textures.envi.header import EnviHeader, read_header
 from spectral_core.textures.reading import Reading, stated_kind, stated_wavelengths
 from spectral_core.weights import LARGEST_BANDS
 

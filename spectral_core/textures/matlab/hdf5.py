@@ -16,8 +16,8 @@ import numpy as np
 from spectral_core.arrays import Float64Array
 from spectral_core.errors import MissingExtraError, SpectralBoothError, TextureError
 from spectral_core.textures.base import Samples
-from spectral_core.textures.matlab_file import Variable
-from spectral_core.textures.row_buffer import RowBuffer, block_rows
+from spectral_core.textures.images.row_buffer import RowBuffer, block_rows
+from spectral_core.textures.matlab.file import Variable
 
 _CLASSES = {
     "double": "f8", "single": "f4", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",

@@ -1,0 +1,1 @@
+"""ENVI images: a header of text and a file of samples."""

@@ -1,0 +1,1 @@
+"""Textures in image formats: one image per wavelength, multi-band TIFF, spectral OpenEXR."""

@@ -1,0 +1,1 @@
+"""Textures that are computed, not captured."""
