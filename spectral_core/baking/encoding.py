@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from spectral_core.arrays import Float32Array, Float64Array
+from spectral_core.arrays import Float32Array, Float64Array, IntArray
 from spectral_core.display import DisplayProfile, SRGBCurve
 from spectral_core.display.models.matrix import GammaMatrix
 from spectral_core.display.profile import GAMUT_TOLERANCE
@@ -65,14 +65,16 @@ class Encoding:
         return codes.astype(self.dtype)
 
     def _codes(self, linear: Float32Array) -> Float32Array:
-        """Clipped codes; in float32 where they are powers, 2e-7 of white: a hundredth of a 16-bit step."""
+        """Clipped codes; in float32 where they are powers, within 1e-6: a fifteenth of a 16-bit step."""
         model = self.profile.model
         if isinstance(model, GammaMatrix):
-            return np.power(np.clip(linear, 0.0, 1.0), (1 / model.gamma).astype(np.float32))
+            # Exponents as long as a pixel's colours: NumPy's inner loop would have three steps otherwise.
+            exponents = np.tile(1 / model.gamma, linear[0].size // 3).reshape(linear.shape[1:])
+            return _power(_inside(linear), exponents.astype(np.float32))
         if not isinstance(model, SRGBCurve):
             return np.clip(model.encode(linear), 0.0, 1.0).astype(np.float32)
-        inside = np.clip(linear, 0.0, 1.0)
-        curve = np.power(inside, np.float32(1 / 2.4))
+        inside = _inside(linear)
+        curve = _power(inside, np.float32(1 / 2.4))
         curve *= np.float32(1.055)
         curve -= np.float32(0.055)
         # The straight part lies above the curve below the threshold, and is cut off at its end above it.
@@ -81,9 +83,26 @@ class Encoding:
         return np.maximum(curve, inside, out=curve)
 
 
-def count_outside(linear: Float32Array) -> int:
-    """How many of the colours (n, 3) are out of gamut."""
-    outside = linear < -GAMUT_TOLERANCE
-    outside |= linear > 1 + GAMUT_TOLERANCE
-    # Ten times as fast as `any` over an axis of three.
-    return int(np.count_nonzero(outside[:, 0] | outside[:, 1] | outside[:, 2]))
+def _inside(linear: Float32Array) -> Float32Array:
+    """Clipped to 0..1: NumPy 1.26's `clip` takes three times as long."""
+    inside = np.maximum(linear, np.float32(0.0))
+    return np.minimum(inside, np.float32(1.0), out=inside)
+
+
+def _power(base: Float32Array, exponent: Float32Array | np.float32) -> Float32Array:
+    """``base ** exponent`` for bases from 0 to 1, within 1e-6 of 1, in a third of `power`'s time."""
+    with np.errstate(divide="ignore"):  # 0 has the logarithm that gives 0 again
+        result = np.log2(base)
+    result *= exponent
+    return np.asarray(np.exp2(result, out=result))
+
+
+def count_outside(linear: Float32Array) -> IntArray:
+    """How many of the colours (n, pictures, 3) are out of gamut in each picture: (pictures,)."""
+    outside = linear < np.float32(-GAMUT_TOLERANCE)
+    outside |= linear > np.float32(1 + GAMUT_TOLERANCE)
+    if not outside.any():
+        return np.zeros(linear.shape[1], dtype=np.int64)
+    # `any` and `sum` over short axes take ten times as long.
+    colours = outside[..., 0] | outside[..., 1] | outside[..., 2]
+    return np.array([np.count_nonzero(colours[:, index]) for index in range(linear.shape[1])])

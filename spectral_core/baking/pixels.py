@@ -12,9 +12,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from typing import Literal
+from functools import cached_property
+from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from spectral_core.arrays import BoolArray, Float32Array, Float64Array, IntArray
 from spectral_core.textures.base import HyperspectralTexture, Samples
@@ -69,8 +71,25 @@ class PixelRule:
         """Whether nothing of a block (pixels, bands) needs the rule, seen from its extremes."""
         if self.ignore_value is not None and bool((stored == self.ignore_value).any()):
             return False
+        lowest, highest = self._clean_range
+        if lowest == 0 and stored.dtype.isnative and stored.dtype.kind in "iuf":
+            # As unsigned integers, negative numbers and NaN are larger than all others: one pass instead of two.
+            bits = np.dtype(f"u{stored.dtype.itemsize}")
+            return bool(stored.view(bits).max() <= _as_stored(highest, stored.dtype).view(bits))
         # NaN is the extreme of whatever holds it, and compares as false.
-        return bool(stored.min() >= self.dark.max() and stored.max() <= self.highest.min())
+        return bool(stored.min() >= lowest and stored.max() <= highest)
+
+    def is_whole(self, stored: Samples, result: Float32Array) -> bool:
+        """Whether a block (pixels, bands) holds nothing but numbers, seen from its projection (pixels, columns)."""
+        if self.ignore_value is not None and bool((stored == self.ignore_value).any()):
+            return False
+        # Whatever is no number spreads: into all sums of its pixel, and into the sum of these.
+        with np.errstate(over="ignore", invalid="ignore"):
+            return bool(np.isfinite(result.sum()))
+
+    @cached_property
+    def _clean_range(self) -> tuple[float, float]:
+        return float(self.dark.max()), float(self.highest.min())
 
     def apply(self, stored: Samples, values: Float32Array) -> PixelCounts:
         """Mend `values`, the float32 copy of a block `stored` (pixels, bands), in place."""
@@ -99,6 +118,15 @@ class PixelRule:
         filled = interpolated(spectra, missing[:, order], self.wavelengths_nm[order])
         values[np.ix_(affected, order)] = filled / self.gain[order] + self.dark[order]
         return int(missing[:, order].all(axis=1).sum())
+
+
+def _as_stored(value: float, dtype: np.dtype[Any]) -> npt.NDArray[Any]:
+    """The largest number of a type that is not above a positive value."""
+    if dtype.kind in "iu":
+        return np.array(min(int(value), np.iinfo(dtype).max), dtype)
+    with np.errstate(over="ignore"):
+        nearest = np.array(value).astype(dtype)
+    return np.asarray(np.nextafter(nearest, dtype.type(0)) if nearest > value else nearest)
 
 
 def interpolated(spectra: Float64Array, missing: BoolArray, wavelengths_nm: Float64Array) -> Float64Array:

@@ -26,6 +26,8 @@ from spectral_core.textures.base import HyperspectralTexture, Samples
 
 # A tile in float32: with what is made of it, it stays in a second-level cache of 2 MB.
 _TILE_BYTES = 1024 * 1024
+# Tiles at a time where nothing is converted or counted.
+_LARGE_TILE = 8
 # A strip is the work of one thread at a time: long enough that threads do not wait for each other.
 _STRIP_BYTES = 16 * 1024 * 1024
 # Weights below this share of the largest are left out at both ends: a million times below what
@@ -168,20 +170,29 @@ def project_rows(
     bad_pixels: BadPixels,
 ) -> PixelCounts:
     """Write the columns of some rows to `out` (height * width, columns); returns what was wrong with them."""
-    counts, stored = PixelCounts(), rows.stored
-    size = max(1, _TILE_BYTES // (4 * stored.shape[2]))
-    scratch = np.empty(size * stored.shape[2], dtype=np.float32)
+    counts, stored, rule = PixelCounts(), rows.stored, how.rule
+    as_stored = stored.dtype == np.float32
+    tile = max(1, _TILE_BYTES // (4 * stored.shape[2]))
+    scratch = np.empty(tile * stored.shape[2], dtype=np.float32)
+    # Nothing but the result is looked at if nothing is counted: then only conversion needs the cache.
+    size = _LARGE_TILE * tile if as_stored and bad_pixels == "refuse" else tile
     for first, block in _blocks(stored, size):
-        clean = how.rule.is_clean(block)
-        values = block if clean and block.dtype == np.float32 else _float32(block, scratch)
-        if not clean:
-            found = how.rule.apply(block, values)
-            if bad_pixels == "refuse" and found.repaired + found.lost:
-                raise _refusal(texture, how.rule, rows.strip, first, block)
-            counts += found
+        result = out[first : first + len(block)]
         with np.errstate(over="ignore", invalid="ignore"):
-            product(values, how.factors, out[first : first + len(block)])
-        if not clean and not np.isfinite(out[first : first + len(block)]).all():
+            product(block if as_stored else _float32(block, scratch), how.factors, result)
+        # Looked at only now: the product reads ahead in memory while it computes, and leaves the block in the cache.
+        if rule.is_whole(block, result) if bad_pixels == "refuse" else rule.is_clean(block):
+            continue
+        for start in range(0, len(block), tile):
+            part = block[start : start + tile]
+            values = _float32(part, scratch)
+            found = rule.apply(part, values)
+            if bad_pixels == "refuse" and found.repaired + found.lost:
+                raise _refusal(texture, rule, rows.strip, first + start, part)
+            counts += found
+            with np.errstate(over="ignore", invalid="ignore"):
+                product(values, how.factors, result[start : start + tile])
+        if not np.isfinite(result).all():
             raise TextureError(
                 f"'{texture.name}' has values too large to add up in the rows from {rows.strip.first}",
                 remedy="give the scale of the values",

@@ -21,7 +21,7 @@ from spectral_core.textures import HyperspectralTexture
 # Beyond it images of half floats would hold infinity.
 _LARGEST_HALF = 65504.0
 # Pixels encoded at a time: what is in between is small enough for the allocator to keep.
-_BLOCK = 8192
+_BLOCK = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +61,12 @@ class Recipe:
     factors: Float32Array
     encoding: Encoding
     bad_pixels: BadPixels
+
+    def colours(self, linear: Float32Array) -> Float32Array:
+        """Linear RGB (n, pictures, 3) of the projection's colours (n, colours, 3)."""
+        if self.sources == tuple(range(linear.shape[1])) and (self.factors == 1).all():
+            return linear
+        return np.asarray(linear[:, self.sources] * self.factors)
 
 
 @dataclass(frozen=True)
@@ -152,14 +158,12 @@ def bake_rows(texture: HyperspectralTexture, recipe: Recipe, rows: Rows, product
     pixels = [np.empty((len(linear), 3), recipe.encoding.dtype) for _ in recipe.pictures]
     outside = np.zeros(len(recipe.pictures), dtype=np.int64)
     for start in range(0, len(linear), _BLOCK):
-        block = linear[start : start + _BLOCK]
-        for index, picture in enumerate(recipe.pictures):
-            # Twice as fast as a copy of the slice.
-            colours: Float32Array = np.take(block, recipe.sources[index], axis=1)
-            if picture.level == 1:
-                colours *= recipe.factors[index]
-            outside[index] += count_outside(colours)
-            pixels[index][start : start + _BLOCK] = recipe.encoding.pixels(colours)
+        colours = recipe.colours(linear[start : start + _BLOCK])
+        outside += count_outside(colours)
+        encoded = recipe.encoding.pixels(colours)
+        for index, image in enumerate(pixels):
+            # Twice as fast as a copy of the slice; an index that is too large cannot be, whatever the mode.
+            np.take(encoded, index, axis=1, out=image[start : start + _BLOCK], mode="clip")
     return BakedStrip(
         tuple(each.reshape(height, texture.width, 3) for each in pixels),
         outside,

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as npst
 
 from spectral_core.baking import PixelCounts, bake, bake_to_memory, level2_weights, project
-from spectral_core.baking.pixels import interpolated
+from spectral_core.baking.pixels import PixelRule, interpolated
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
 from spectral_core.textures import ArrayTexture
@@ -148,3 +148,28 @@ def test_what_is_black_or_of_one_colour_is_not_dead() -> None:
     dark_end[..., :4] = [0.0, 0.0, 0.0, 0.004]
     dark_end[..., 3] += np.random.default_rng(3).normal(0, 1e-3, (40, 30)).clip(0)
     assert not any("dead" in warning for warning in bake_to_memory(ArrayTexture(dark_end, NM), D65).warnings)
+
+
+@pytest.mark.parametrize("dtype", ["u1", "u2", "i2", ">i2", "u4", "i4", "f2", "f4", "f8", ">f4"])
+@pytest.mark.parametrize("dark", [0.0, 3.0])
+def test_clean_is_what_needs_no_rule(dtype: str, dark: float) -> None:
+    """One value at a time, at both ends of what is counted, with the largest and the smallest of the type."""
+    kind = np.dtype(dtype)
+    scale = 1.0 if kind.kind == "f" else 100.0
+    rule = PixelRule(np.full(2, dark), np.full(2, 1 / scale), np.ones(2, bool), np.array([500.0, 600.0]), None)
+    top = dark + 1.05 * scale
+    values = [dark, dark + scale / 2, top, top - scale / 10, top + scale / 10, dark - scale / 100]
+    info = np.iinfo(kind) if kind.kind in "iu" else np.finfo(kind)
+    values += [float(info.max), float(info.min)] + ([np.nan, np.inf, -np.inf] if kind.kind == "f" else [])
+    for value in values:
+        with np.errstate(invalid="ignore", over="ignore"):
+            block = np.full((3, 2), dark + scale / 2).astype(kind)
+            block[1, 0] = np.clip(value, info.min, info.max) if np.isfinite(value) else value
+        stored = float(block[1, 0])
+        clean = bool(dark <= stored <= top)
+        # At the very top the last bit may go either way: then the rule counts nothing either.
+        assert rule.is_clean(block) == clean or stored == pytest.approx(top, rel=1e-3), (value, stored)
+        with np.errstate(over="ignore"):
+            counted = rule.apply(block, block.astype(np.float32))
+        if rule.is_clean(block):
+            assert counted == PixelCounts()
