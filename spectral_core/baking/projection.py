@@ -18,7 +18,7 @@ import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array
 from spectral_core.baking.pixels import BadPixels, PixelCounts, PixelRule
-from spectral_core.baking.products import Product, own_threads
+from spectral_core.baking.products import Product, is_ready, own_threads
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
@@ -173,7 +173,7 @@ def project_rows(
     scratch = np.empty(size * stored.shape[2], dtype=np.float32)
     for first, block in _blocks(stored, size):
         clean = how.rule.is_clean(block)
-        values = block if clean and block.dtype == np.float32 else _float32(block, scratch)
+        values = block if clean and is_ready(block) else _float32(block, scratch)
         if not clean:
             found = how.rule.apply(block, values)
             if bad_pixels == "refuse" and found.repaired + found.lost:

@@ -3,6 +3,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -109,6 +110,28 @@ def test_both_products_are_numpys(rows: int, bands: int, columns: int, across: b
         out = np.full((rows, columns), np.nan, dtype=np.float32)
         product(pixels, factors, out)
         np.testing.assert_allclose(out, exact, rtol=0, atol=bands * 6e-7)
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        lambda cube: np.asfortranarray(cube),
+        lambda cube: cube[:, ::-1],
+        lambda cube: cube[:, :, ::-1],
+        lambda cube: np.repeat(cube, 2, axis=2)[..., ::2],
+        lambda cube: np.broadcast_to(cube[:1, :1], cube.shape),
+        lambda cube: np.broadcast_to(cube[:, :, :1], cube.shape),
+        lambda cube: np.repeat(cube, 3, axis=2)[:, :, 5:6],
+    ],
+    ids=["fortran", "mirrored", "falling", "every second", "one pixel", "one value", "one band of many"],
+)
+def test_floats_that_no_blas_can_take_as_they_lie(layout: Any) -> None:
+    """A Fortran-ordered .npy has no contiguous axis in a row; BLAS would be handed a copy."""
+    cube = np.random.default_rng(5).random((7, 11, 31), dtype=np.float32)
+    values = layout(cube)
+    texture = ArrayTexture(values, np.linspace(400.0, 700.0, values.shape[2]))
+    weights = level2_weights(texture, LIGHTS)
+    assert np.abs(project(texture, weights) - values.astype(np.float64) @ weights).max() < EXACT
 
 
 def test_scipys_product_is_there_where_numpys_is_old() -> None:
