@@ -89,4 +89,5 @@ def baking_steps(
         rows_done += len(strip.pixels[0])
         yield rows_done / texture.height
     shares = outside / (texture.width * texture.height)
-    return BakedArrays(images, tuple(shares.tolist()), counts, (*texture.warnings, *pixel_warnings(texture, counts)))
+    warnings = (*texture.warnings, *pixel_warnings(texture, counts, plan.how.bands_used))
+    return BakedArrays(images, tuple(shares.tolist()), counts, warnings)

@@ -79,6 +79,11 @@ class Projection:
         """Number of columns."""
         return self.factors.shape[1]
 
+    @property
+    def bands_used(self) -> int:
+        """Number of good bands in the range: those whose values count."""
+        return int(self.rule.good.sum())
+
 
 def level2_weights(
     texture: HyperspectralTexture, lights: Sequence[Light], observer: str = DEFAULT_OBSERVER
@@ -239,8 +244,8 @@ def read_rows(texture: HyperspectralTexture, how: Projection, strip: Strip) -> R
 
 
 def _per_column(texture: HyperspectralTexture) -> bool:
-    """Whether each column of the image has a gain of its own: then its values are used, not its samples."""
-    return texture.gain.ndim > 1
+    """Whether each column of the image has a gain or dark level of its own: then values are used, not samples."""
+    return texture.gain.ndim > 1 or texture.dark.ndim > 1
 
 
 def _with_weight(weights: Float64Array) -> slice:
