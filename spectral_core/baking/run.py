@@ -22,7 +22,7 @@ import numpy as np
 
 from spectral_core.baking.dead_bands import without_dead_bands
 from spectral_core.baking.pixels import BadPixels, PixelCounts, pixel_warnings
-from spectral_core.baking.projection import in_order
+from spectral_core.baking.projection import grid_warnings, in_order
 from spectral_core.baking.records import BakedImage, Origin, kept_images, record_path, write_record
 from spectral_core.baking.strips import BakedStrip, Picture, Recipe, bake_rows, check_reflectance, recipe
 from spectral_core.display import DisplayProfile, srgb
@@ -156,7 +156,12 @@ def bake(
         bands=texture.bands,
         peak_memory_MB=tally.memory_MB or None,
         counts=counts,
-        warnings=(*texture.warnings, *_of_fluorescence(texture, lights), *pixel_warnings(texture, counts, bands_used)),
+        warnings=(
+            *texture.warnings,
+            *grid_warnings(texture, lights, observer),
+            *_of_fluorescence(texture, lights),
+            *pixel_warnings(texture, counts, bands_used),
+        ),
     )
 
 

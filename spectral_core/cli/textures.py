@@ -128,7 +128,7 @@ def bake_command(
     with progress_bar("baking") as progress, _workers(cluster, reading) as strips:
         for index, (file, each) in enumerate(opened.items()):
             results[file] = bake(
-                each, chosen, output, display, image_format, observer, tuple(int(level) for level in levels),
+                each, chosen, output, display, image_format, observer, [int(level) for level in dict.fromkeys(levels)],
                 progress=_part(progress, index, len(opened)), bad_pixels=bad_pixels, again=again, strips=strips(file),
             )  # fmt: skip
     document = documents.bakes_document(results)
