@@ -153,4 +153,4 @@ def _workers(address: str | None, reading: Reading) -> Iterator[Callable[[Path],
     from spectral_core.baking.cluster import Cluster, connected
 
     with connected(address) as client:
-        yield lambda file: Cluster(client, file.absolute(), reading)
+        yield lambda file: Cluster(client, file.absolute(), reading.relative_to(Path.cwd()))
