@@ -11,6 +11,8 @@ import numpy as np
 
 from spectral_core import light_design, standards, weights
 from spectral_core.arrays import Float64Array
+from spectral_core.baking.projection import grid_warnings, level2_weights
+from spectral_core.baking.strips import check_reflectance
 from spectral_core.display import DisplayProfile, srgb
 from spectral_core.display.characterising.advice import Advice
 from spectral_core.display.characterising.characterise import Characterisation
@@ -138,7 +140,7 @@ def reflectance_document(spectra: Spectra, light: Light, profile: DisplayProfile
         }
         for index, name in enumerate(spectra.names)
     ]
-    warnings = [*spectra.warnings, *light.warnings, *_extension(factors)]
+    warnings = [*spectra.warnings, *light.warnings, *factors.warnings()]
     return {"light": light.name, "colours": colours, "warnings": warnings}
 
 
@@ -191,22 +193,21 @@ def pixel_document(
     spectrum = texture.pixel(x, y)
     document: Document = {
         "wavelengths_nm": texture.wavelengths_nm.tolist(),
-        "reflectance": spectrum.tolist(),
+        "reflectance": [float(value) if np.isfinite(value) else None for value in spectrum],
         "kind": texture.kind,
         "warnings": list(texture.warnings),
     }
-    if not np.isfinite(spectrum).all():
+    if not np.isfinite(spectrum[texture.good]).all():
         raise TextureError(
             f"pixel {x}, {y} holds a value that is no finite number", where=path, remedy="repair the capture"
         )
     if light is not None:
-        if texture.kind != "reflectance":
-            raise TextureError(f"holds {texture.kind}, which is already lit", where=path, remedy="leave --light out")
-        factors = light.weighting_factors(texture.wavelengths_nm, observer)
-        XYZ = spectrum @ factors.matrix
+        check_reflectance(texture)
+        # With bad bands left out, as a bake does.
+        XYZ = np.nan_to_num(spectrum) @ level2_weights(texture, [light], observer)
         document["XYZ"] = XYZ.tolist()
         document["rgb_8bit"] = (255 * srgb().to_codes(XYZ)).tolist()
-        document["warnings"] += _extension(factors)
+        document["warnings"] += grid_warnings(texture, [light], observer)
     return document
 
 
@@ -261,17 +262,6 @@ def long_lists(document: Document) -> list[str]:
 
 def _quality(quality: LightQuality) -> dict[str, Any]:
     return {"cct_K": quality.cct_K, "duv": quality.duv, "rf": quality.rf, "ra": quality.ra}
-
-
-def _extension(factors: weights.WeightingFactors) -> list[str]:
-    """One warning if the ends of the reflectance carry weight that was never measured."""
-    if factors.extended < 1e-4:
-        return []
-    low, high = factors.wavelengths_nm.min(), factors.wavelengths_nm.max()
-    return [
-        f"bands from {low:g} to {high:g} nm: {factors.extended_below:.2%} below and {factors.extended_above:.2%} above "
-        "of the white's X, Y or Z rest on the repeated end values (ASTM E308)"
-    ]
 
 
 def _parse_xy(text: str) -> Float64Array:

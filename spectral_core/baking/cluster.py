@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import socket
 import threading
+import uuid
 from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -26,6 +27,9 @@ from spectral_core.textures import HyperspectralTexture, Reading, open_texture
 _STRIPS_PER_THREAD = 3
 _CONNECTING_SECONDS = 15
 _DEFAULT_PORT = 8786
+
+# Where a texture is, how it is read, and for which bake.
+_Source = tuple[str, Reading, str]
 
 
 class Cluster:
@@ -53,10 +57,12 @@ class Cluster:
             If workers keep dying, or the scheduler is gone.
         """
         waiting: deque[Any] = deque()
+        # Workers live on from bake to bake, and files may change in between: each bake opens them anew.
+        source = (str(self._path), self._reading, uuid.uuid4().hex)
         threads = max(1, sum(self._client.nthreads().values()))
         try:
             for strip in strips(texture):
-                waiting.append(self._client.submit(_bake_part, str(self._path), self._reading, plan, strip, pure=False))
+                waiting.append(self._client.submit(_bake_part, source, plan, strip, pure=False))
                 if len(waiting) >= _STRIPS_PER_THREAD * threads:
                     yield self._result(waiting.popleft())
             while waiting:
@@ -126,14 +132,15 @@ def _check_that_somebody_listens(address: str) -> None:
     socket.create_connection((host, port), timeout=_CONNECTING_SECONDS).close()
 
 
-def _bake_part(path: str, reading: Reading, plan: Recipe, strip: Strip) -> BakedStrip:
+def _bake_part(source: _Source, plan: Recipe, strip: Strip) -> BakedStrip:
     """What a worker does."""
-    texture = _opened(path, reading, threading.get_ident())
+    texture = _opened(source, threading.get_ident())
     with own_threads() as product:
         return bake_rows(texture, plan, read_rows(texture, plan.how, Strip(*strip)), product)
 
 
 @lru_cache(maxsize=16)
-def _opened(path: str, reading: Reading, thread: int) -> HyperspectralTexture:
-    """A texture for each thread, since not all formats can be read by several at once."""
+def _opened(source: _Source, thread: int) -> HyperspectralTexture:
+    """A texture for each bake and thread, since not all formats can be read by several at once."""
+    path, reading, _ = source
     return open_texture(path, reading)

@@ -11,7 +11,7 @@ from spectral_core.baking.dead_bands import without_dead_bands
 from spectral_core.baking.encoding import Pixels
 from spectral_core.baking.pixels import BadPixels, PixelCounts, pixel_warnings
 from spectral_core.baking.products import Product
-from spectral_core.baking.projection import Rows, in_order
+from spectral_core.baking.projection import Rows, grid_warnings, in_order
 from spectral_core.baking.strips import BakedStrip, Picture, bake_rows, check_reflectance, recipe
 from spectral_core.display import DisplayProfile, srgb
 from spectral_core.imaging import LEVELS, ImageFormat
@@ -89,4 +89,6 @@ def baking_steps(
         rows_done += len(strip.pixels[0])
         yield rows_done / texture.height
     shares = outside / (texture.width * texture.height)
-    return BakedArrays(images, tuple(shares.tolist()), counts, (*texture.warnings, *pixel_warnings(texture, counts)))
+    warnings = (*texture.warnings, *grid_warnings(texture, lights, observer))
+    warnings += tuple(pixel_warnings(texture, counts, plan.how.bands_used))
+    return BakedArrays(images, tuple(shares.tolist()), counts, warnings)

@@ -37,6 +37,10 @@ class PixelCounts:
     def __add__(self, other: PixelCounts) -> PixelCounts:
         return PixelCounts(*(getattr(self, each.name) + getattr(other, each.name) for each in fields(self)))
 
+    def __or__(self, other: PixelCounts) -> PixelCounts:
+        """What two passes over the same pixels found: they may have read different bands."""
+        return PixelCounts(*(max(getattr(self, each.name), getattr(other, each.name)) for each in fields(self)))
+
 
 @dataclass(frozen=True)
 class PixelRule:
@@ -146,10 +150,10 @@ def interpolated(spectra: Float64Array, missing: BoolArray, wavelengths_nm: Floa
     return np.where(missing, low + share * (high - low), spectra)
 
 
-def pixel_warnings(texture: HyperspectralTexture, counts: PixelCounts) -> Iterator[str]:
-    """What the rule for bad pixels did, in words."""
+def pixel_warnings(texture: HyperspectralTexture, counts: PixelCounts, bands: int) -> Iterator[str]:
+    """What the rule for bad pixels did, in words; `bands` were looked at."""
     pixels = texture.width * texture.height
-    values = pixels * int(texture.good.sum())
+    values = pixels * bands
     if counts.repaired:
         yield f"{counts.repaired} of {pixels} pixels have values that are no numbers: filled in from neighbouring bands"
     if counts.lost:

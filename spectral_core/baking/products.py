@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from spectral_core.arrays import Float32Array
+from spectral_core.textures.base import Samples
 
 Product = Callable[[Float32Array, Float32Array, Float32Array], None]
 """``product(pixels (m, bands), factors (bands, n), out (m, n))``: one of the pixels' axes is contiguous."""
@@ -39,6 +40,23 @@ def own_threads() -> Iterator[Product]:
 
     with threadpoolctl.threadpool_limits(1, user_api="blas"):
         yield _by_blas(sgemm)
+
+
+def is_ready(pixels: Samples) -> bool:
+    """Whether pixels (m, bands) can be multiplied as they lie in memory: float32, one axis contiguous, no overlap."""
+    return pixels.dtype == np.float32 and (_along_bands(pixels) or _along_pixels(pixels))
+
+
+def _along_bands(pixels: Samples) -> bool:
+    return pixels.strides[1] == _FLOAT_BYTES and _is_leading(pixels.strides[0], pixels.shape[1])
+
+
+def _along_pixels(pixels: Samples) -> bool:
+    return pixels.strides[0] == _FLOAT_BYTES and _is_leading(pixels.strides[1], pixels.shape[0])
+
+
+def _is_leading(stride: int, count: int) -> bool:
+    return stride >= count * _FLOAT_BYTES and stride % _FLOAT_BYTES == 0
 
 
 def _by_numpy(pixels: Float32Array, factors: Float32Array, out: Float32Array) -> None:
@@ -84,9 +102,9 @@ def _by_blas(sgemm: Any) -> Product:
         """BLAS counts by columns: it is asked for out' = factors' pixels'."""
         count, bands = pixels.shape
         columns = factors.shape[1]
-        along_bands = pixels.strides[1] == _FLOAT_BYTES and pixels.strides[0] >= bands * _FLOAT_BYTES
+        along_bands = _along_bands(pixels)
         leading = pixels.strides[0 if along_bands else 1] // _FLOAT_BYTES
-        if not along_bands and (pixels.strides[0] != _FLOAT_BYTES or leading < count):
+        if not is_ready(pixels):
             raise ValueError(f"no axis of the pixels is contiguous: strides {pixels.strides}")
         if not (factors.flags.c_contiguous and out.flags.c_contiguous):
             raise ValueError("weights and result must be contiguous")

@@ -12,13 +12,14 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import spectral_core
+from spectral_core.baking.pixels import PixelCounts
 from spectral_core.display import DisplayProfile
 from spectral_core.errors import SpectralBoothError, TextureError
 from spectral_core.files import atomic_path, read_text
@@ -42,6 +43,8 @@ class BakedImage:
         Share of its pixels that are out of gamut.
     extended
         Share of the white that rests on extended ends of the bands.
+    counts, bands_used
+        What was wrong with the pixels when it was made, and in how many bands.
     kept
         True if it was there already and has been left as it was.
     """
@@ -51,6 +54,8 @@ class BakedImage:
     path: Path
     clipped_fraction: float
     extended: float
+    counts: PixelCounts
+    bands_used: int
     kept: bool = False
 
 
@@ -67,14 +72,13 @@ class Origin:
 
     def key(self, light: Light, level: int) -> str | None:
         """Digest of what an image comes from; None if the texture has no file that could be told again."""
-        files = self.texture.files
-        if not files:
-            return None
         texture = self.texture
+        if not texture.files:
+            return None
         told: list[Any] = [
             spectral_core.__version__, level, self.observer, self.image_format, self.bad_pixels, texture.kind,
-            texture.ignore_value, texture.height, texture.width,
-            *((str(file.resolve()), file.stat().st_size, file.stat().st_mtime_ns) for file in files),
+            texture.ignore_value, texture.height, texture.width, texture.part,
+            *((str(file.resolve()), *_source_stamp(file)) for file in texture.files),
         ]  # fmt: skip
         arrays = [texture.gain, texture.dark, texture.good, texture.wavelengths_nm, self.profile.to_codes(_PROBED)]
         for each in (light, self.reference) if level == 1 else (light,):
@@ -108,7 +112,14 @@ def _kept(path: Path, entry: dict[str, Any], key: str | None) -> BakedImage | No
     if key is None or entry["key"] != key or not path.is_file() or _stamp(path) != entry["stamp"]:
         return None
     return BakedImage(
-        str(entry["light"]), int(entry["level"]), path, float(entry["clipped_fraction"]), float(entry["extended"]), True
+        light=str(entry["light"]),
+        level=int(entry["level"]),
+        path=path,
+        clipped_fraction=float(entry["clipped_fraction"]),
+        extended=float(entry["extended"]),
+        counts=PixelCounts(**{name: int(count) for name, count in entry["bad_pixels"].items()}),
+        bands_used=int(entry["bands_used"]),
+        kept=True,
     )
 
 
@@ -125,12 +136,21 @@ def write_record(record: Path, images: Sequence[BakedImage], keys: Mapping[Path,
             "level": image.level,
             "clipped_fraction": image.clipped_fraction,
             "extended": image.extended,
+            "bad_pixels": asdict(image.counts),
+            "bands_used": image.bands_used,
             "key": keys[image.path],
             "stamp": _stamp(image.path),
         }
     document = {"format": _FORMAT, "version": _VERSION, "images": entries}
     with atomic_path(record) as temporary:
         temporary.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def _source_stamp(file: Path) -> list[int]:
+    try:
+        return _stamp(file)
+    except OSError as error:
+        raise TextureError(f"cannot be found any more ({error.strerror})", where=file, remedy="put it back") from None
 
 
 def _stamp(path: Path) -> list[int]:

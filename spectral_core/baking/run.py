@@ -7,6 +7,7 @@ show: the pixel's colour under the reference white times the lamp's colour, chan
 from __future__ import annotations
 
 import contextlib
+import operator
 import os
 import re
 import time
@@ -14,13 +15,14 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
 
 from spectral_core.baking.dead_bands import without_dead_bands
 from spectral_core.baking.pixels import BadPixels, PixelCounts, pixel_warnings
-from spectral_core.baking.projection import in_order
+from spectral_core.baking.projection import grid_warnings, in_order
 from spectral_core.baking.records import BakedImage, Origin, kept_images, record_path, write_record
 from spectral_core.baking.strips import BakedStrip, Picture, Recipe, bake_rows, check_reflectance, recipe
 from spectral_core.display import DisplayProfile, srgb
@@ -53,7 +55,7 @@ class BakeResult:
     peak_memory_MB
         Largest anonymous memory seen, None where the system does not tell.
     counts
-        What was wrong with the pixels.
+        What was wrong with the pixels, also those of images that were kept.
     warnings
         What a user should know.
     """
@@ -141,16 +143,25 @@ def bake(
         shares = tally.outside / (texture.width * texture.height)
         for (path, picture), share in zip(wanted.items(), shares.tolist(), strict=True):
             factors = picture.light.weighting_factors(texture.wavelengths_nm[texture.good], observer)
-            images[path] = BakedImage(picture.light.name, picture.level, path, share, factors.extended)
+            images[path] = BakedImage(
+                picture.light.name, picture.level, path, share, factors.extended, tally.counts, plan.how.bands_used
+            )
         write_record(record, [images[path] for path in wanted], keys)
+    counts = reduce(operator.or_, (image.counts for image in images.values()), PixelCounts())
+    bands_used = max((image.bands_used for image in images.values()), default=texture.bands)
     return BakeResult(
         images=tuple(images[path] for path in pictures),
         seconds={**tally.seconds, "total": time.perf_counter() - started},
         pixels=texture.width * texture.height,
         bands=texture.bands,
         peak_memory_MB=tally.memory_MB or None,
-        counts=tally.counts,
-        warnings=(*texture.warnings, *_of_fluorescence(texture, lights), *pixel_warnings(texture, tally.counts)),
+        counts=counts,
+        warnings=(
+            *texture.warnings,
+            *grid_warnings(texture, lights, observer),
+            *_of_fluorescence(texture, lights),
+            *pixel_warnings(texture, counts, bands_used),
+        ),
     )
 
 

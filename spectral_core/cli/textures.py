@@ -128,7 +128,7 @@ def bake_command(
     with progress_bar("baking") as progress, _workers(cluster, reading) as strips:
         for index, (file, each) in enumerate(opened.items()):
             results[file] = bake(
-                each, chosen, output, display, image_format, observer, tuple(int(level) for level in levels),
+                each, chosen, output, display, image_format, observer, [int(level) for level in dict.fromkeys(levels)],
                 progress=_part(progress, index, len(opened)), bad_pixels=bad_pixels, again=again, strips=strips(file),
             )  # fmt: skip
     document = documents.bakes_document(results)
@@ -153,4 +153,4 @@ def _workers(address: str | None, reading: Reading) -> Iterator[Callable[[Path],
     from spectral_core.baking.cluster import Cluster, connected
 
     with connected(address) as client:
-        yield lambda file: Cluster(client, file.absolute(), reading)
+        yield lambda file: Cluster(client, file.absolute(), reading.relative_to(Path.cwd()))

@@ -70,7 +70,9 @@ class HyperspectralTexture(ABC):
         it is fast from the top down.
     files
         The files that it is read from, so that others can open it again and see whether it changed;
-        none for what is computed or in memory. The first is what `open_texture` was given.
+        none for what is computed or in memory.
+    part
+        What of its files it is, where they could hold several: the name of an array.
     warnings
         What a user should know of it.
     """
@@ -86,6 +88,7 @@ class HyperspectralTexture(ABC):
     fluorescent: bool = False
     concurrent: bool = False
     files: tuple[Path, ...] = ()
+    part: str = ""
     warnings: tuple[str, ...] = ()
 
     @abstractmethod

@@ -13,7 +13,7 @@ class DerivedTexture(HyperspectralTexture):
         self._texture = texture
         for name in (
             "name", "format", "height", "width", "wavelengths_nm", "kind", "scale", "ignore_value", "fluorescent",
-            "concurrent", "files", "warnings",
+            "concurrent", "files", "part", "warnings",
         ):  # fmt: skip
             setattr(self, name, getattr(texture, name))
 

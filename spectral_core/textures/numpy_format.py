@@ -85,7 +85,7 @@ class NpzTexture(HyperspectralTexture):
                 scale = _scale_inside(archive, members, path)
         except _DAMAGE as error:
             raise _damaged(error, path) from None
-        self.name = path.stem
+        self.name, self.part = path.stem, self._member
         self.height, self.width, bands = self._shape
         self.wavelengths_nm = frozen(checked_wavelengths(wavelengths, bands, path))
         self.kind, self.scale = stated_kind(path, reading, self._dtype, self._member, scale)

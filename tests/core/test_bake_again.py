@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spectral_core.baking import bake
+from spectral_core.baking import PixelCounts, bake
 from spectral_core.files import atomic_path
 from spectral_core.imaging import oiio
 from spectral_core.lights import Light
-from spectral_core.textures import open_texture
+from spectral_core.textures import Reading, open_texture
 
 Run = Callable[..., tuple[int, str, str]]
 NM = np.arange(400.0, 701.0, 10)
@@ -94,6 +94,62 @@ def test_changed_files_are_made_again(baked: Callable[..., list[bool]], tmp_path
     for damage in ("", "[]", "{", '{"format": "spectral-booth bake", "version": 1, "images": {"t0_A.exr": 3}}'):
         (out / "t0.bake.json").write_text(damage)
         assert baked() == [False, False]
+
+
+def test_an_image_of_a_sequence_that_changed_in_its_place(tmp_path: Path) -> None:
+    """A folder's time stays when one of its files is written to; a pattern has no time at all."""
+    folder = tmp_path / "capture"
+    folder.mkdir()
+    for nm in (450, 550, 650):
+        image = oiio().ImageOutput.create("x.png")
+        assert image.open(str(folder / f"{nm}.png"), oiio().ImageSpec(4, 3, 1, "uint8"))
+        image.write_image(np.full((3, 4, 1), nm // 4, np.uint8))
+        image.close()
+    for given in (folder, folder / "*.png"):
+
+        def kept(given: Path = given) -> list[bool]:
+            texture = open_texture(given, Reading(scale=255))
+            return [image.kept for image in bake(texture, [Light.builtin("D65")], tmp_path / "out").images]
+
+        assert kept() == [given != folder]  # the same images, whichever way they are named
+        assert kept() == [True]
+        (folder / "550.png").write_bytes((folder / "650.png").read_bytes())
+        os.utime(folder / "550.png", ns=(1, len(given.name)))
+        assert (kept(), kept()) == ([False], [True])
+
+
+def test_another_array_of_the_same_file_is_another_texture(tmp_path: Path) -> None:
+    cubes = np.random.default_rng(3).random((2, 3, 4, len(NM)))
+    np.savez(tmp_path / "two.npz", radiance=cubes[0], counts=cubes[1], wavelengths_nm=NM)
+    (tmp_path / "white.csv").write_text("nm,white\n" + "".join(f"{nm:g},1\n" for nm in NM))
+    scipy_io = pytest.importorskip("scipy.io")
+    scipy_io.savemat(tmp_path / "both.mat", {"a": cubes[0], "b": cubes[1], "wavelengths": NM})
+    white = tmp_path / "white.csv"
+    for name, readings in (
+        ("two.npz", [Reading("radiance", white=white), Reading("counts", white=white)]),
+        ("both.mat", [Reading("reflectance", variable="a"), Reading("reflectance", variable="b")]),
+    ):
+        for reading in readings:
+            result = bake(open_texture(tmp_path / name, reading), [Light.builtin("A")], tmp_path / "out")
+            assert [image.kept for image in result.images] == [False], reading
+
+
+def test_what_was_wrong_is_said_of_kept_images_too(tmp_path: Path) -> None:
+    """Infrared bands have no weight and are not looked at: negative values are a share of those used."""
+    nm = np.arange(400.0, 1401.0, 10)
+    values = np.full((2, 3, len(nm)), 0.5, np.float32)
+    values[0, 0, 5], values[1, 1, :2] = np.nan, -0.1
+    np.savez(tmp_path / "t.npz", reflectance=values, wavelengths_nm=nm)
+    texture = open_texture(tmp_path / "t.npz")
+    told = []
+    for lights in (("D65",), ("D65",), ("D65", "A")):
+        result = bake(texture, [Light.builtin(each) for each in lights], tmp_path / "out")
+        assert result.counts == PixelCounts(repaired=1, negative=2)
+        told.append(result.warnings)
+    assert told[0] == told[1] == told[2]
+    used = result.images[0].bands_used
+    assert 44 <= used < 75  # the observer ends at 830 nm, and the spline's weights fade out beyond
+    assert f"{2 / (6 * used):.2%} of the values are negative" in told[0][-1]
 
 
 def test_a_stopped_bake_leaves_nothing_half_written(tmp_path: Path) -> None:

@@ -94,6 +94,25 @@ def test_texture_and_bake(document: Callable[..., dict[str, Any]], tmp_path: Pat
     assert set(baked) >= {"outputs", "seconds", "pixels", "bands", "peak_memory_MB"}
 
 
+def test_a_pixel_s_colour_leaves_bad_bands_out_as_a_bake_does(
+    document: Callable[..., dict[str, Any]], run: Callable[..., tuple[int, str, str]], tmp_path: Path
+) -> None:
+    cube = np.full((3, 4, 31), 0.5, "<f4")
+    cube[..., 12], cube[..., 20] = np.nan, 7.0
+    (tmp_path / "t.raw").write_bytes(cube.tobytes())
+    good = ",".join("0" if band in (12, 20) else "1" for band in range(31))
+    (tmp_path / "t.hdr").write_text(
+        "ENVI\nsamples = 4\nlines = 3\nbands = 31\ndata type = 4\ninterleave = bip\nbyte order = 0\n"
+        f"wavelength units = nm\nwavelength = {{{','.join(map(str, range(400, 701, 10)))}}}\nbbl = {{{good}}}\n"
+    )
+    pixel = document("texture", "pixel", tmp_path / "t.hdr", 1, 1, "--light", "D65", "--kind", "reflectance")
+    assert pixel["reflectance"][12] is None
+    # A grey of 0.5 whatever the bad bands hold; float64.
+    assert abs(pixel["XYZ"][1] - 0.5) < 1e-9
+    code, _, err = run("texture", "pixel", tmp_path / "t.hdr", 1, 1, "--light", "D65", "--kind", "counts")
+    assert (code, "holds counts of a camera; give a white reference" in err) == (2, True)
+
+
 @pytest.mark.parametrize(
     "command", [["light", "D65"], ["lights"], ["reflectance", "colorchecker"], ["light-design", "--peak", "450"]]
 )

@@ -67,6 +67,24 @@ def test_the_same_images_as_alone(cluster: Any, texture_path: Path, tmp_path: Pa
     assert len(pixels(tmp_path / "alone")) == 2
 
 
+def test_files_that_change_between_bakes_and_references_beside_oneself(
+    cluster: Any, texture_path: Path, tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers stay in their own folder, and had the old file open."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "white.csv").write_text("nm,white\n" + "".join(f"{nm:g},2\n" for nm in NM))
+    for value in (0.5, 1.5):
+        with np.load(texture_path) as held:
+            shape = next(iter(held.values())).shape
+        np.savez(texture_path, radiance=np.full(shape, value, np.float32), wavelengths_nm=NM)
+        options = ("--white", "white.csv", "--light", "D65", "-o", "out", "--cluster", cluster.scheduler_address)
+        code, _, err = run("bake", "t.npz", *options)
+        assert code == 0, err
+        # Grey, in half floats: 2**-11 of it.
+        green = oiio().ImageBuf("out/t_D65.exr").get_pixels(oiio().FLOAT)[..., 1]
+        assert np.abs(green - value / 2).max() < value * 2**-11
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="there is no SIGKILL on Windows")
 def test_a_worker_killed_in_mid_bake_loses_nothing(cluster: Any, texture_path: Path, tmp_path: Path) -> None:
     bake(open_texture(texture_path), LIGHTS, tmp_path / "alone")

@@ -70,6 +70,14 @@ def test_the_published_system_s_sequence(tmp_path: Path) -> None:
     np.testing.assert_allclose(texture.rows(0, 37), values / 255, rtol=2.4e-7)
 
 
+def test_the_folder_one_is_in_has_a_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """``bake .`` called its images ``_D65.exr``."""
+    folder = write_sequence(tmp_path / "capture", cube("uint8"), [f"{nm}.png" for nm in range(400, 501, 25)])
+    monkeypatch.chdir(folder)
+    for given in (".", "*.png", "../capture", "../capture/"):
+        assert open_texture(given).name == "capture"
+
+
 def test_more_images_than_may_be_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In blocks of 8 rows, so that images beyond the limit are opened again for each."""
     monkeypatch.setattr("spectral_core.textures.images.sequence._MOST_OPEN", 2)

@@ -3,6 +3,7 @@ from __future__ import annotations
 import threading
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -109,6 +110,59 @@ def test_both_products_are_numpys(rows: int, bands: int, columns: int, across: b
         out = np.full((rows, columns), np.nan, dtype=np.float32)
         product(pixels, factors, out)
         np.testing.assert_allclose(out, exact, rtol=0, atol=bands * 6e-7)
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        lambda cube: np.asfortranarray(cube),
+        lambda cube: cube[:, ::-1],
+        lambda cube: cube[:, :, ::-1],
+        lambda cube: np.repeat(cube, 2, axis=2)[..., ::2],
+        lambda cube: np.broadcast_to(cube[:1, :1], cube.shape),
+        lambda cube: np.broadcast_to(cube[:, :, :1], cube.shape),
+        lambda cube: np.repeat(cube, 3, axis=2)[:, :, 5:6],
+    ],
+    ids=["fortran", "mirrored", "falling", "every second", "one pixel", "one value", "one band of many"],
+)
+def test_floats_that_no_blas_can_take_as_they_lie(layout: Any) -> None:
+    """A Fortran-ordered .npy has no contiguous axis in a row; BLAS would be handed a copy."""
+    cube = np.random.default_rng(5).random((7, 11, 31), dtype=np.float32)
+    values = layout(cube)
+    texture = ArrayTexture(values, np.linspace(400.0, 700.0, values.shape[2]))
+    weights = level2_weights(texture, LIGHTS)
+    assert np.abs(project(texture, weights) - values.astype(np.float64) @ weights).max() < EXACT
+
+
+def test_bands_too_close_together_are_told_of_or_refused() -> None:
+    """A pair 0.01 nm apart among bands of 10 nm: its difference, which is noise, is carried over 10 nm.
+
+    Under the narrow lines of FL11 that amplifies errors 70 times; pairs 1.6 nm apart, where detectors
+    overlap, 1.4 times, as much as any grid.
+    """
+    even = np.arange(380.0, 781.0, 10.0)
+    light = Light.builtin("FL11")
+
+    def paired(gap: float) -> ArrayTexture:
+        wavelengths = np.sort(np.append(even, 550 + gap))
+        return ArrayTexture(np.full((2, 3, len(wavelengths)), 0.5, np.float32), wavelengths)
+
+    with pytest.raises(TextureError, match=r"bands near 550 nm that lie too close together.* 69 times"):
+        bake_to_memory(paired(0.01), [light])
+    assert any("up to 7.8 times: around 550 nm" in each for each in bake_to_memory(paired(0.1), [light]).warnings)
+    assert bake_to_memory(paired(1.6), [light]).warnings == ()
+    assert light.weighting_factors(paired(1.6).wavelengths_nm).amplification < 1.5
+    for step in (2.0, 5.0, 10.0, 20.0, 40.0):
+        for each in ("D65", "FL11", "LPS", "Mercury"):
+            assert Light.builtin(each).weighting_factors(np.arange(380.0, 781.0, step)).amplification < 2
+
+
+def test_infrared_has_no_colour() -> None:
+    texture = ArrayTexture(np.full((2, 3, 9), 0.5, np.float32), np.linspace(900, 1700, 9))
+    with pytest.raises(TextureError, match="no good band of visible light, only from 900 to 1700 nm"):
+        bake_to_memory(texture, LIGHTS)
+    texture = ArrayTexture(np.full((2, 3, 9), 0.5, np.float32), np.linspace(700, 1500, 9))
+    assert any("rest on the repeated end values" in each for each in bake_to_memory(texture, LIGHTS).warnings)
 
 
 def test_scipys_product_is_there_where_numpys_is_old() -> None:

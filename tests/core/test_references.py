@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from spectral_core.baking import level2_weights, project
 from spectral_core.errors import SpectrumError, TextureError
+from spectral_core.lights import Light
 from spectral_core.textures import HyperspectralTexture, Reading, open_texture
 
 NM = np.arange(400.0, 700.0, 50)
@@ -160,6 +162,19 @@ def test_bands_that_the_white_spoils_have_no_weight(scene: dict[str, Any]) -> No
     texture = open_texture(scene["counts"], Reading(white=save(scene["folder"] / "w.npz", white)))
     assert not texture.good[0]
     assert (whole(texture)[..., 0] == 0).all()
+
+
+def test_columns_that_differ_in_darkness_alone(scene: dict[str, Any]) -> None:
+    """White less dark is the same everywhere, so the gain is one row and the dark level is not."""
+    dark = np.arange(WIDTH * BANDS, dtype=np.uint16).reshape(1, WIDTH, BANDS)
+    save(scene["folder"] / "white.npz", dark + np.uint16(2000))
+    save(scene["folder"] / "dark.npz", dark)
+    texture = open_texture(scene["counts"], Reading(white=scene["white"], dark=scene["dark"]))
+    assert (texture.gain.shape, texture.dark.shape) == ((BANDS,), (WIDTH, BANDS))
+    weights = level2_weights(texture, [Light.builtin("A")])
+    exact = (scene["values"]["counts"] - dark.astype(float)) / 2000 @ weights
+    # float32 sums of a few values up to 15.
+    assert np.abs(project(texture, weights) - exact).max() < 1e-5
 
 
 def test_a_texture_s_own_scale_is_kept(tmp_path: Path) -> None:

@@ -61,7 +61,10 @@ class ImageSequence(HyperspectralTexture):
         self.wavelengths_nm = frozen(wavelengths[order])
         self.height, self.width, self._channels, self._dtype = _common_shape(self._paths)
         self.kind, self.scale = stated_kind(path, reading, self._dtype)
-        self.name = path.name if path.is_dir() else path.parent.name or "sequence"
+        # Of "." and "..", too, it is the folder's own name.
+        self.name = (path if path.is_dir() else path.parent).resolve().name or "sequence"
+        # A folder's own time says nothing of what is written into its images.
+        self.files = tuple(self._paths)
         if _ENDINGS[self._paths[0].suffix.lower()] == "jpeg":
             self.warnings += ("JPEG is lossy: these are not the values that were captured",)
         self._open: dict[int, Any] = {}

@@ -48,7 +48,7 @@ class MatlabTexture(HyperspectralTexture):
         file = _opened(path)
         cube = _chosen(file.variables, reading, path)
         self.format = file.format
-        self.name = path.stem
+        self.name, self.part = path.stem, cube.name
         self.height, self.width, _ = cube.shape
         wavelengths, self.warnings = _wavelengths(file, cube, reading, path)
         self.wavelengths_nm = frozen(wavelengths)
