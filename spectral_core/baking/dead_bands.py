@@ -12,7 +12,8 @@ from spectral_core.arrays import BoolArray
 from spectral_core.textures.base import HyperspectralTexture, Samples
 from spectral_core.textures.derived import DerivedTexture
 
-_ROWS = 16
+# Some hundred pixels all over the image.
+_ROWS, _COLUMNS = 8, 64
 # Enough pixels that no living band has the same value in all of them.
 _FEWEST_PIXELS = 64
 # A neighbour carries a signal if it is at least this bright on average: darker surfaces than 1 % hardly exist.
@@ -37,8 +38,9 @@ def without_dead_bands(texture: HyperspectralTexture) -> HyperspectralTexture:
 def dead_bands(texture: HyperspectralTexture) -> BoolArray:
     """(bands,): good bands that are stuck at zero, at no number or at their type's end beside a band with signal."""
     rows = np.unique(np.linspace(0, texture.height - 1, _ROWS).astype(int))
-    stored = np.concatenate([texture.samples(int(row), 1)[0] for row in rows])
-    values = np.concatenate([texture.rows(int(row), 1)[0] for row in rows])
+    step = -(-texture.width // _COLUMNS)
+    stored = np.concatenate([texture.samples(int(row), 1)[0, ::step] for row in rows])
+    values = np.concatenate([texture.rows(int(row), 1)[0, ::step] for row in rows])
     with np.errstate(invalid="ignore"):
         stuck = (np.isnan(values) | (values == values[0])).all(axis=0) & (
             np.isnan(values).all(axis=0) | _at_end(stored)

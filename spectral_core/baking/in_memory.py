@@ -78,10 +78,7 @@ def baking_steps(
 
     def one(rows: Rows, product: Product) -> BakedStrip:
         first, height = rows.strip
-        strip = bake_rows(texture, plan, rows, product)
-        for image, pixels in zip(images, strip.pixels, strict=True):
-            image[first : first + height] = pixels
-        return strip
+        return bake_rows(texture, plan, rows, product, [image[first : first + height] for image in images])
 
     for strip in in_order(texture, plan.how, one):
         outside += strip.outside

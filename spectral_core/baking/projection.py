@@ -18,17 +18,14 @@ import numpy as np
 
 from spectral_core.arrays import Float32Array, Float64Array
 from spectral_core.baking.pixels import BadPixels, PixelCounts, PixelRule
-from spectral_core.baking.products import Product, is_ready, own_threads
+from spectral_core.baking.products import Product, own_threads
+from spectral_core.baking.tiles import TILE_BYTES, as_float32, as_it_lies, tiles
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
 from spectral_core.textures.base import HyperspectralTexture, Samples
 from spectral_core.weights import LARGEST_AMPLIFICATION, WeightingFactors
 
-# A tile in float32: with what is made of it, it stays in a second-level cache of 2 MB.
-_TILE_BYTES = 1024 * 1024
-# Tiles at a time where nothing is converted or counted.
-_LARGE_TILE = 8
 # A strip is the work of one thread at a time: long enough that threads do not wait for each other.
 _STRIP_BYTES = 16 * 1024 * 1024
 # Weights below this share of the largest are left out at both ends: a million times below what
@@ -205,27 +202,24 @@ def project_rows(
 ) -> PixelCounts:
     """Write the columns of some rows to `out` (height * width, columns); returns what was wrong with them."""
     counts, stored, rule = PixelCounts(), rows.stored, how.rule
-    as_stored = is_ready(stored[0])
-    tile = max(1, _TILE_BYTES // (4 * stored.shape[2]))
-    scratch = np.empty(tile * stored.shape[2], dtype=np.float32)
-    # Nothing but the result is looked at if nothing is counted: then only conversion needs the cache.
-    size = _LARGE_TILE * tile if as_stored and bad_pixels == "refuse" else tile
-    for first, block in _blocks(stored, size):
-        result = out[first : first + len(block)]
+    bands = stored.shape[2]
+    size = max(1, TILE_BYTES // (4 * bands))
+    scratch = np.empty(size * bands, dtype=np.float32)
+    for first, tile in tiles(stored, size):
+        ready = as_it_lies(tile)
+        result = out[first : first + tile.shape[0] * tile.shape[1]]
         with np.errstate(over="ignore", invalid="ignore"):
-            product(block if as_stored else _float32(block, scratch), how.factors, result)
-        # Looked at only now: the product reads ahead in memory while it computes, and leaves the block in the cache.
-        if rule.is_whole(block, result) if bad_pixels == "refuse" else rule.is_clean(block):
+            product(as_float32(tile, scratch) if ready is None else ready, how.factors, result)
+        # Looked at only now: the product reads ahead in memory while it computes, and leaves the tile in the cache.
+        if rule.is_whole(tile, result) if bad_pixels == "refuse" else rule.is_clean(tile):
             continue
-        for start in range(0, len(block), tile):
-            part = block[start : start + tile]
-            values = _float32(part, scratch)
-            found = rule.apply(part, values)
-            if bad_pixels == "refuse" and found.repaired + found.lost:
-                raise _refusal(texture, rule, rows.strip, first + start, part)
-            counts += found
-            with np.errstate(over="ignore", invalid="ignore"):
-                product(values, how.factors, result[start : start + tile])
+        values = as_float32(tile, scratch if tile.size <= scratch.size else np.empty(tile.size, dtype=np.float32))
+        found = rule.apply(tile.reshape(-1, bands), values)
+        if bad_pixels == "refuse" and found.repaired + found.lost:
+            raise _refusal(texture, rule, rows.strip, first, tile.reshape(-1, bands))
+        counts += found
+        with np.errstate(over="ignore", invalid="ignore"):
+            product(values, how.factors, result)
         if not np.isfinite(result).all():
             raise TextureError(
                 f"'{texture.name}' has values too large to add up in the rows from {rows.strip.first}",
@@ -292,28 +286,6 @@ def _with_weight(weights: Float64Array) -> slice:
     size = np.abs(weights).max(axis=1)
     used = np.flatnonzero(size > _NEGLIGIBLE * size.max())
     return slice(int(used[0]), int(used[-1]) + 1)
-
-
-def _blocks(stored: Samples, size: int) -> Iterator[tuple[int, Samples]]:
-    """(first pixel, pixels (at most size, bands)) of rows (count, width, bands): views, never copies."""
-    count, width, bands = stored.shape
-    if count > 1 and stored.strides[0] != width * stored.strides[1]:  # rows do not follow each other
-        for row in range(count):
-            yield from ((row * width + first, block) for first, block in _blocks(stored[row : row + 1], size))
-        return
-    pixels = stored.reshape(count * width, bands)
-    for first in range(0, count * width, size):
-        yield first, pixels[first : first + size]
-
-
-def _float32(block: Samples, scratch: Float32Array) -> Float32Array:
-    """A copy of a block (pixels, bands) in scratch memory, its axes in the same order in memory."""
-    flat = scratch[: block.size]
-    along_bands = abs(block.strides[1]) <= abs(block.strides[0])
-    values = flat.reshape(block.shape) if along_bands else flat.reshape(block.shape[::-1]).T
-    with np.errstate(over="ignore", invalid="ignore"):
-        np.copyto(values, block, casting="unsafe")
-    return values
 
 
 def _refusal(texture: HyperspectralTexture, rule: PixelRule, strip: Strip, first: int, block: Samples) -> TextureError:

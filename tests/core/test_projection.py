@@ -73,7 +73,7 @@ def plain(values: np.ndarray) -> Plain:
 @pytest.mark.parametrize("dtype", ["u1", "<u2", ">u2", "<i2", "<u4", "<f4", ">f4", "<f8"])
 def test_every_order_and_type_is_the_float64_product(order: str, dtype: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tiles and strips that do not divide the rows; all within `EXACT` of the white."""
-    monkeypatch.setattr(projection, "_TILE_BYTES", 4 * 41 * 29)
+    monkeypatch.setattr(projection, "TILE_BYTES", 4 * 41 * 29)
     monkeypatch.setattr(projection, "_STRIP_BYTES", 4 * 41 * 53 * 5)
     cube = np.random.default_rng(1).uniform(0, 1, (37, 53, 41))
     scale = 1.0 if np.dtype(dtype).kind == "f" else 250.0
