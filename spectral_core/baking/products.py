@@ -36,10 +36,24 @@ def own_threads() -> Iterator[Product]:
     if sgemm is None:
         yield _by_numpy
         return
-    import threadpoolctl
-
-    with threadpoolctl.threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         yield _by_blas(sgemm)
+
+
+@contextmanager
+def one_blas_thread() -> Iterator[None]:
+    """No thread of BLAS is woken while the block runs, where threadpoolctl is at hand.
+
+    The OpenBLAS of NumPy 1.26 wakes them even to invert three by three numbers; then they spin for a tenth
+    of a second, and take a processor from whatever comes next.
+    """
+    try:
+        import threadpoolctl
+    except ImportError:
+        yield
+        return
+    with threadpoolctl.threadpool_limits(1, user_api="blas"):
+        yield
 
 
 def is_ready(pixels: Samples) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 from spectral_core.arrays import Float32Array, IntArray
 from spectral_core.baking.encoding import Encoding, Pixels, count_outside
 from spectral_core.baking.pixels import BadPixels, PixelCounts
-from spectral_core.baking.products import Product
+from spectral_core.baking.products import Product, one_blas_thread
 from spectral_core.baking.projection import Projection, Rows, level2_weights, project_rows, projection
 from spectral_core.display import DisplayProfile
 from spectral_core.errors import TextureError
@@ -120,17 +120,18 @@ def recipe(
         if not any(seen is each for each in lights):
             lights.append(seen)
         sources.append(next(index for index, each in enumerate(lights) if each is seen))
-    weights = level2_weights(texture, lights, observer)
     encoding = Encoding(profile, levels)
-    part = encoding.linear_part()
     constant = None
-    if part is not None:
-        matrix, offset = part
-        weights = (weights.reshape(-1, len(lights), 3) @ matrix).reshape(weights.shape)
-        constant = np.tile(offset, len(lights))
-    lamps = [
-        profile.to_linear(picture.light.XYZ(observer)) if picture.level == 1 else np.ones(3) for picture in pictures
-    ]
+    with one_blas_thread():
+        weights = level2_weights(texture, lights, observer)
+        part = encoding.linear_part()
+        if part is not None:
+            matrix, offset = part
+            weights = (weights.reshape(-1, len(lights), 3) @ matrix).reshape(weights.shape)
+            constant = np.tile(offset, len(lights))
+        lamps = [
+            profile.to_linear(picture.light.XYZ(observer)) if picture.level == 1 else np.ones(3) for picture in pictures
+        ]
     return Recipe(
         pictures=tuple(pictures),
         how=projection(texture, weights, constant),
