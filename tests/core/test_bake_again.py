@@ -172,6 +172,13 @@ def test_two_textures_of_one_name_are_refused(run: Run, tmp_path: Path) -> None:
     assert "named like those of" in err
 
 
+def test_all_textures_are_looked_at_before_the_first_is_baked(run: Run, tmp_path: Path) -> None:
+    (good,) = write_textures(tmp_path, 1)
+    np.savez(tmp_path / "counts.npz", counts=np.ones((2, 3, len(NM)), np.uint16), wavelengths_nm=NM)
+    code, _, err = run("bake", good, tmp_path / "counts.npz", "--light", "A", "-o", tmp_path / "out")
+    assert (code, "'counts' holds counts of a camera" in err, (tmp_path / "out").exists()) == (2, True, False)
+
+
 def test_leftovers_of_the_dead_are_removed_and_those_of_the_living_kept(tmp_path: Path) -> None:
     target = tmp_path / "a.exr"
     with atomic_path(target) as mine:
