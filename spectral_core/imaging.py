@@ -63,10 +63,19 @@ class ImageWriter:
     """Writes an RGB image from the top down, a few rows at a time.
 
     Only sRGB images say their colour space: other programs would decode a headset's codes otherwise.
+    Messages name the file `target`, where `path` is a temporary one that will become it.
     """
 
-    def __init__(self, path: Path, width: int, height: int, image_format: ImageFormat, is_srgb: bool = True) -> None:
-        self._path = path
+    def __init__(
+        self,
+        path: Path,
+        width: int,
+        height: int,
+        image_format: ImageFormat,
+        is_srgb: bool = True,
+        target: Path | None = None,
+    ) -> None:
+        self._path, self._target = path, target or path
         suffix, pixel_type = IMAGE_FORMATS[image_format]
         spec = oiio().ImageSpec(width, height, 3, pixel_type)
         if is_srgb:
@@ -76,28 +85,30 @@ class ImageWriter:
         # By the format and not by the name, which is a temporary one.
         self._output: Any = oiio().ImageOutput.create(suffix.lstrip("."))
         if self._output is None or not self._output.open(str(path), spec):
-            raise OutputError(f"cannot be written ({self._error()})", where=path, remedy="choose another folder")
+            raise self._failure("choose another folder")
 
     def write(self, rows: npt.NDArray[Any]) -> None:
         """Append rows (count, width, 3): integers as they are, or float32 that is rounded to them from 0..1."""
         count = len(rows)
         if not self._output.write_scanlines(self._row, self._row + count, 0, np.ascontiguousarray(rows)):
-            raise OutputError(f"cannot be written ({self._error()})", where=self._path, remedy="is the disk full?")
+            raise self._failure("is the disk full?")
         self._row += count
 
     def close(self) -> None:
         """Finish the file."""
         if not self._output.close():
-            raise OutputError(f"cannot be written ({self._error()})", where=self._path, remedy="is the disk full?")
+            raise self._failure("is the disk full?")
 
-    def _error(self) -> str:
-        return error_text(self._output if self._output is not None else oiio())
+    def _failure(self, remedy: str) -> OutputError:
+        said = error_text(self._output if self._output is not None else oiio())
+        said = said.replace(str(self._path), str(self._target))
+        return OutputError(f"cannot be written ({said})", where=self._target, remedy=remedy)
 
 
 def write_png(path: Path, linear: Float32Array) -> None:
     """Write linear sRGB (height, width, 3) as an 8-bit sRGB PNG, clipped, as a screen shows it."""
     height, width, _ = linear.shape
     with atomic_path(path) as temporary:
-        writer = ImageWriter(temporary, width, height, "png8")
+        writer = ImageWriter(temporary, width, height, "png8", target=path)
         writer.write(np.asarray(srgb_encode(np.clip(linear, 0.0, 1.0)), dtype=np.float32))
         writer.close()

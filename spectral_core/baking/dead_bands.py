@@ -18,6 +18,8 @@ _ROWS, _COLUMNS = 8, 64
 _FEWEST_PIXELS = 64
 # A neighbour carries a signal if it is at least this bright on average: darker surfaces than 1 % hardly exist.
 _SIGNAL = 0.01
+# Between living bands: four neighbours of 10 nm may be dead; what is black over more may be so.
+_LARGEST_GAP_NM = 50.0
 
 
 def without_dead_bands(texture: HyperspectralTexture) -> HyperspectralTexture:
@@ -36,23 +38,28 @@ def without_dead_bands(texture: HyperspectralTexture) -> HyperspectralTexture:
 
 
 def dead_bands(texture: HyperspectralTexture) -> BoolArray:
-    """(bands,): good bands that are stuck at zero, at no number or at their type's end beside a band with signal."""
+    """(bands,): good bands that never hold a number beside a band with signal, and those that are stuck at zero or
+    at their type's end between two bands with signal.
+
+    What is black from some wavelength on, or over more than a gap, is the colour of a surface.
+    """
     rows = np.unique(np.linspace(0, texture.height - 1, _ROWS).astype(int))
     step = -(-texture.width // _COLUMNS)
     stored = np.concatenate([texture.samples(int(row), 1)[0, ::step] for row in rows])
     values = np.concatenate([texture.rows(int(row), 1)[0, ::step] for row in rows])
     with np.errstate(invalid="ignore"):
-        stuck = (np.isnan(values) | (values == values[0])).all(axis=0) & (
-            np.isnan(values).all(axis=0) | _at_end(stored)
-        )
+        empty = np.isnan(values).all(axis=0)
+        stuck = empty | ((values == values[0]).all(axis=0) & _at_end(stored))
         bright = ~stuck & texture.good & (np.nan_to_num(values, nan=0.0, posinf=0.0, neginf=0.0).mean(axis=0) > _SIGNAL)
     order = np.argsort(texture.wavelengths_nm)
-    beside = np.zeros(texture.bands, dtype=bool)
-    living = ~stuck[order]
-    for at in np.flatnonzero(~living):
-        near = [np.flatnonzero(living[:at])[-1:], at + 1 + np.flatnonzero(living[at + 1 :])[:1]]
-        beside[order[at]] = bool(bright[order[np.concatenate(near)]].any())
-    return np.asarray(stuck & beside & texture.good)
+    dead = np.zeros(texture.bands, dtype=bool)
+    living = order[~stuck[order]]
+    for band in order[stuck[order]]:
+        after = int(np.searchsorted(texture.wavelengths_nm[living], texture.wavelengths_nm[band]))
+        near = living[max(0, after - 1) : after + 1]
+        gap_nm = float(np.ptp(texture.wavelengths_nm[near])) if 0 < after < len(living) else np.inf
+        dead[band] = bright[near].any() if empty[band] else bright[near].all() and gap_nm <= _LARGEST_GAP_NM
+    return np.asarray(dead & texture.good)
 
 
 def _at_end(stored: Samples) -> BoolArray:

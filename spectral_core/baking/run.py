@@ -233,7 +233,8 @@ def _writers(
         temporaries = [stack.enter_context(atomic_path(path, keep_suffix=False)) for path in paths]
         pool = stack.enter_context(ThreadPoolExecutor(os.cpu_count()))
         writers = [
-            ImageWriter(temporary, texture.width, texture.height, image_format, is_srgb) for temporary in temporaries
+            ImageWriter(temporary, texture.width, texture.height, image_format, is_srgb, target)
+            for temporary, target in zip(temporaries, paths, strict=True)
         ]
         try:
             yield lambda strip: list(pool.map(ImageWriter.write, writers, strip.pixels))

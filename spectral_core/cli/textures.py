@@ -12,6 +12,7 @@ import click
 
 from spectral_core import documents
 from spectral_core.baking import BakeResult, bake
+from spectral_core.baking.strips import check_reflectance
 from spectral_core.cli.console import Report, cell, emit, facts, progress_bar, table
 from spectral_core.cli.options import as_json, observer_option, profile_option
 from spectral_core.display import load_profile
@@ -124,6 +125,8 @@ def bake_command(
     chosen, display = [Light.load(each) for each in lights], load_profile(profile)
     opened = {file: open_texture(file, reading) for file in files}
     documents.check_names(opened)
+    for each in opened.values():  # before the first one, which may take long, is baked
+        check_reflectance(each)
     results: dict[Path, BakeResult] = {}
     with progress_bar("baking") as progress, _workers(cluster, reading) as strips:
         for index, (file, each) in enumerate(opened.items()):

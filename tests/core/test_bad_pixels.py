@@ -10,6 +10,7 @@ from hypothesis.extra import numpy as npst
 
 from spectral_core.baking import PixelCounts, bake, bake_to_memory, level2_weights, project
 from spectral_core.baking.pixels import PixelRule, interpolated
+from spectral_core.display import srgb
 from spectral_core.errors import TextureError
 from spectral_core.lights import Light
 from spectral_core.textures import ArrayTexture
@@ -173,3 +174,19 @@ def test_clean_is_what_needs_no_rule(dtype: str, dark: float) -> None:
             counted = rule.apply(block, block.astype(np.float32))
         if rule.is_clean(block):
             assert counted == PixelCounts()
+
+
+@pytest.mark.parametrize("dtype", ["f4", "u1"])
+def test_surfaces_that_are_black_in_some_bands_are_not_dead(dtype: str) -> None:
+    """Saturated blue, red and magenta: taken for dead, their zeros became the brightness of the other bands."""
+    shades = np.random.default_rng(4).uniform(0.7, 1, (20, 20, 1))
+    for bright in (NM < 480, NM > 600, (NM < 480) | (NM > 600)):
+        values = 0.6 * bright * shades
+        scale = 1.0 if dtype == "f4" else 255.0
+        stored = values.astype(dtype) if dtype == "f4" else np.round(values * scale).astype(dtype)
+        texture = ArrayTexture(stored, NM, scale=scale)
+        baked = bake_to_memory(texture, D65)
+        assert not any("dead" in warning for warning in baked.warnings)
+        exact = srgb().to_linear((stored / scale) @ D65[0].weighting_factors(NM).matrix)
+        # float32 sums of 31 values below 1, and the display's matrix with entries up to 3.
+        np.testing.assert_allclose(baked.images[0], exact, rtol=0, atol=3e-6)

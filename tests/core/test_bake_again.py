@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 from spectral_core.baking import PixelCounts, bake
+from spectral_core.errors import OutputError
 from spectral_core.files import atomic_path
 from spectral_core.imaging import oiio
 from spectral_core.lights import Light
@@ -170,6 +171,32 @@ def test_two_textures_of_one_name_are_refused(run: Run, tmp_path: Path) -> None:
     code, _, err = run("bake", tmp_path / "a/t0.npz", tmp_path / "b/t0.npz", "--light", "A", "-o", tmp_path / "out")
     assert code == 2
     assert "named like those of" in err
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of files are those of POSIX")
+@pytest.mark.parametrize("image_format", ["exr", "tiff"])
+def test_a_full_disk_is_told_of_by_the_image_s_own_name(tmp_path: Path, image_format: Any) -> None:
+    import resource
+
+    (path,) = write_textures(tmp_path, 1)
+    texture, lights = open_texture(path), [Light.builtin("D65")]
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, before[1]))
+    try:
+        with pytest.raises(OutputError) as raised:
+            bake(texture, lights, tmp_path / "out", image_format=image_format)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert ".part" not in str(raised.value)
+    assert "t0_D65." in str(raised.value)
+    assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_all_textures_are_looked_at_before_the_first_is_baked(run: Run, tmp_path: Path) -> None:
+    (good,) = write_textures(tmp_path, 1)
+    np.savez(tmp_path / "counts.npz", counts=np.ones((2, 3, len(NM)), np.uint16), wavelengths_nm=NM)
+    code, _, err = run("bake", good, tmp_path / "counts.npz", "--light", "A", "-o", tmp_path / "out")
+    assert (code, "'counts' holds counts of a camera" in err, (tmp_path / "out").exists()) == (2, True, False)
 
 
 def test_leftovers_of_the_dead_are_removed_and_those_of_the_living_kept(tmp_path: Path) -> None:
