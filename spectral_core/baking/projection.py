@@ -261,6 +261,7 @@ def in_order(
         finally:
             for future in waiting:
                 future.cancel()
+            texture.close()
 
 
 def strips(texture: HyperspectralTexture) -> list[Strip]:

@@ -99,6 +99,9 @@ class HyperspectralTexture(ABC):
         possible. What `values` are is ``(samples - dark) * gain``.
         """
 
+    def close(self) -> None:  # noqa: B027  # most hold nothing open
+        """Let go of what is open for reading; the next read opens it again."""
+
     @property
     def gain(self) -> Float64Array:
         """(bands,) or (width, bands): value per stored unit."""

@@ -21,6 +21,10 @@ class DerivedTexture(HyperspectralTexture):
         """`count` rows from `first` on as they are stored: (count, width, bands)."""
         return self._texture.samples(first, count)
 
+    def close(self) -> None:
+        """As the texture."""
+        self._texture.close()
+
     def rows_per_tile(self) -> int:
         """As many as the texture's own format reads well."""
         return self._texture.rows_per_tile()

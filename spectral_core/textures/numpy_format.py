@@ -108,23 +108,26 @@ class NpzTexture(HyperspectralTexture):
         try:
             if self._stream is None or first < self._next_row:
                 self.close()
-                archive = zipfile.ZipFile(self._path)
-                self._stream = archive.open(f"{self._member}.npy")
+                with zipfile.ZipFile(self._path) as archive:  # the member keeps its file open
+                    self._stream = archive.open(f"{self._member}.npy")
                 _header(self._stream, self._path)
                 self._next_row = 0
             self._stream.seek((first - self._next_row) * row_bytes, 1)
             data = self._stream.read(count * row_bytes)
         except _DAMAGE as error:
+            self.close()
             raise _damaged(error, self._path) from None
         if len(data) < count * row_bytes:
             raise TextureError(
                 f"ends in row {first + len(data) // row_bytes}", where=self._path, remedy="write it again"
             )
         self._next_row = first + count
+        if self._next_row >= self.height:
+            self.close()
         return np.frombuffer(data, dtype=self._dtype).reshape(count, self.width, self.bands)
 
     def close(self) -> None:
-        """Close the archive; the next read opens it again."""
+        """Let go of the archive; the next read opens it again."""
         if self._stream is not None:
             self._stream.close()
             self._stream = None
