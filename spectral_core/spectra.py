@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
+from spectral_core import matlab_spectra
 from spectral_core.arrays import Float64Array, frozen
 from spectral_core.errors import SpectrumError
 from spectral_core.files import atomic_path, read_text
@@ -57,7 +58,8 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
     """Read a CSV of spectra: first column nm, one column a spectrum, header optional.
 
     Comma, semicolon or tab separated; ``#`` starts a comment; ``# kind: lines`` makes every row an
-    exact spectral line. A table from long to short wavelengths is turned round.
+    exact spectral line. A table from long to short wavelengths is turned round. A MATLAB file is read
+    as `spectral_core.matlab_spectra` says.
 
     Raises
     ------
@@ -65,6 +67,8 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
         With file and line, for anything that is not such a table.
     """
     path = Path(path)
+    if _starts_with(path, matlab_spectra.SIGNATURE):
+        return _matlab(path, quantity)
     rows, lines = _rows(path)
     header, body = _split_header(path, rows)
     width = len(_cells(path, *body[0]))
@@ -89,6 +93,34 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
         )
     names = tuple(name.strip() for name in header[1:]) if header else tuple(str(i + 1) for i in range(width - 1))
     return Spectra(names, frozen(wavelengths), frozen(values), header is not None, lines, tuple(warnings))
+
+
+def _matlab(path: Path, quantity: Quantity) -> Spectra:
+    wavelengths, values = matlab_spectra.matlab_table(path)
+    if not (np.isfinite(wavelengths).all() and np.isfinite(values).all()):
+        raise SpectrumError("holds something that is not a finite number", where=path, remedy="correct it")
+    order = np.argsort(wavelengths, kind="stable")
+    wavelengths, values = wavelengths[order], values[:, order]
+    repeated = wavelengths[1:][np.diff(wavelengths) == 0]
+    if len(repeated):
+        raise SpectrumError(f"wavelength {repeated[0]:g} nm occurs twice", where=path, remedy="keep one of them")
+    if len(wavelengths) > _MOST_WAVELENGTHS:
+        raise SpectrumError(
+            f"{len(wavelengths)} wavelengths, more than {_MOST_WAVELENGTHS}", where=path, remedy="average"
+        )
+    _check_wavelengths(path, wavelengths, needs_curve=True)
+    warnings = _check_values(path, wavelengths, values, quantity)
+    names = tuple(str(index + 1) for index in range(len(values)))
+    return Spectra(names, frozen(wavelengths), frozen(values), named=False, warnings=tuple(warnings))
+
+
+def _starts_with(path: Path, signature: bytes) -> bool:
+    """False for what cannot be read: whoever reads it next says why."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(signature)) == signature
+    except (OSError, ValueError):
+        return False
 
 
 def write_spectra(

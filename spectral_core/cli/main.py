@@ -11,6 +11,7 @@ import click
 
 from spectral_core import documents
 from spectral_core.baking import bake
+from spectral_core.cli.assign import add_assign_command
 from spectral_core.cli.blender import add_blender_commands
 from spectral_core.cli.compare import add_compare_command
 from spectral_core.cli.console import cell, emit, facts, progress_bar, rounded, table
@@ -180,6 +181,7 @@ add_profile_commands(cli)
 add_luminance_commands(cli)
 add_probe_command(cli)
 add_compare_command(cli)
+add_assign_command(cli)
 add_patch_commands(cli)
 add_blender_commands(cli)
 
