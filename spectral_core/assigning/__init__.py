@@ -1,6 +1,6 @@
 """Spectra for RGB textures: reflectances whose colours under the scanner's lamp are those of the texels."""
 
-from spectral_core.assigning.assign import Assignment, assign, spectra_source
+from spectral_core.assigning.assignment import Assignment, assign, spectra_source
 from spectral_core.assigning.judging import HeldOut, Spread, held_out
 from spectral_core.assigning.library import Library, read_library
 

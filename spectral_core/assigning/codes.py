@@ -72,7 +72,11 @@ def code_colours(
         return _by_display(load_profile(profile), lamp_XYZ, unused)
     if image.icc:
         return _by_icc(image.icc, image.path, lamp_XYZ, " of the image itself")
-    said = f" (the file says '{image.colour_space}')" if image.colour_space not in ("", "sRGB") else ""
+    said = (
+        f" (the file says '{image.colour_space}')"
+        if image.colour_space and "srgb" not in image.colour_space.casefold()
+        else ""
+    )
     return _by_display(
         srgb(), lamp_XYZ, (f"no profile given and none in the image{said}: its codes are taken as sRGB",)
     )

@@ -12,6 +12,7 @@ from spectral_core.arrays import Float64Array
 from spectral_core.assigning.choice import SpectraOfColours
 from spectral_core.assigning.codes import between
 from spectral_core.assigning.library import Library
+from spectral_core.errors import SpectrumError
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
 
@@ -62,11 +63,20 @@ def held_out(
     """Give each reflectance of a library's colour a spectrum from the others, and compare under lights.
 
     Colours are those under the scanner's lamp, without a scanner's own errors.
+
+    Raises
+    ------
+    SpectrumError
+        If the library has one reflectance only.
     """
+    if not lights:
+        return ()
+    if len(library.names) < 2:
+        raise SpectrumError("one reflectance alone cannot be left out", remedy="give a larger library, or no --judge")
     XYZ = library.XYZ(scanner, observer)
     found = source.choose(XYZ, np.arange(len(XYZ))).spectra(source.table)
-    white, D65, matrix = scanner.XYZ(observer), Light.builtin("D65").XYZ(), standards.srgb_to_XYZ_matrix()
-    linear = np.linalg.solve(matrix, between(white, D65) @ XYZ.T).T
+    white, matrix = scanner.XYZ(observer), standards.srgb_to_XYZ_matrix()
+    linear = np.linalg.solve(matrix, between(white, matrix @ np.ones(3)) @ XYZ.T).T
     results = []
     for light in lights:
         own_white = light.XYZ(observer)

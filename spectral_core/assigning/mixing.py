@@ -2,15 +2,16 @@
 
 Of all mixtures ``w >= 0, sum w = 1`` of a colour's neighbours the one is taken that minimises
 
-    sum w log(w / k)  +  |r|^2 / (2 epsilon),
+    sum w^2 / 2k  +  |r|^2 / 2 epsilon,
 
-r being the difference between its colour and the wanted one, in units near to those of CIEDE2000. The
-priors k are the weights of modified Shepard interpolation (Franke & Nielson 1980): they make it the
-library's own spectrum where the colour is that of a spectrum, and fade to nothing where a spectrum stops being one
-of the neighbours. The objective is strictly convex, so that its minimum is a continuous function of the colour. It is
-found in its dual, which has three unknowns (as local maximum-entropy shape functions are: Arroyo & Ortiz 2006):
-minimise ``log sum k exp(lambda y) + epsilon |lambda|^2 / 2``, with y the neighbours' differences
-from the wanted colour; then ``w ~ k exp(lambda y)`` and ``r = -epsilon lambda``.
+r being the difference between its colour and the wanted one, in units near to those of CIEDE2000 and
+relative to how far the nearest neighbour is. The priors k are the weights of modified Shepard
+interpolation (Franke & Nielson 1980): with them the mixture is a library's own spectrum where the colour is
+that spectrum's, and a spectrum fades to nothing where it stops being one of the neighbours. The objective is
+strictly convex, so that its minimum changes continuously with the colour. It is found in its dual, which has
+four unknowns. With y the neighbours' differences from the wanted colour, ``w = k max(0, m + l y)``, where
+m and l minimise ``sum k max(0, m + l y)^2 / 2 + epsilon |l|^2 / 2 - m``, which is piecewise quadratic; then
+``r = -epsilon l``.
 """
 
 from __future__ import annotations
@@ -24,14 +25,18 @@ import numpy as np
 from spectral_core import standards
 from spectral_core.arrays import Float64Array, IntArray
 
-# Of residuals in units of dE00: where the mixture can reproduce a colour, it does within some thousandths.
+# Where a mixture can reproduce a colour, it does within some hundredths of how far the nearest spectrum is. Much
+# smaller, and mixtures turn sharper corners.
 _EPSILON = 1e-3
 _STEPS = 100
-_SETTLED = 1e-6
-_FACTOR = 8.0
+_SETTLED = 1e-8
 _HALVINGS = 20
 # A colour nearer than this to a spectrum's is that spectrum's.
 _SAME = 1e-6
+_NEAR = 1e-3
+# Of the dual's unknowns: the first is that of the weights' sum.
+_OF_SUM, _OF_COLOUR = np.array([1.0, 0, 0, 0]), np.array([0.0, 1, 1, 1])
+_RIDGE = np.diag([1e-12, _EPSILON, _EPSILON, _EPSILON])
 _COLOURS = 1 << 14
 # CIE 15:2018, 8.2.1: below it the cube root is a line.
 _TOE = (6 / 29) ** 3
@@ -66,8 +71,8 @@ def _mixtures(
     XYZ: Float64Array, white: Float64Array, neighbours_XYZ: Float64Array, dE00: Float64Array
 ) -> tuple[Float64Array, Float64Array]:
     differences = np.einsum("nij,nkj->nki", _metric(XYZ, white), neighbours_XYZ - XYZ[:, None])
-    differences /= (dE00[:, 0] + _SAME)[:, None, None]
-    weights = _entropic(_priors(dE00, differences.shape[1]), differences)
+    differences /= np.maximum(dE00[:, 0], _NEAR)[:, None, None]
+    weights = _weights(_priors(dE00, differences.shape[1]), differences)
     Lab = standards.XYZ_to_Lab(XYZ, white)
 
     def reached(which: IntArray, weights: Float64Array) -> Float64Array:
@@ -111,47 +116,37 @@ def _metric(XYZ: Float64Array, white: Float64Array) -> Float64Array:
     return np.asarray(weigh @ to_Lab)
 
 
-def _entropic(priors: Float64Array, differences: Float64Array) -> Float64Array:
-    """The weights (n, count) of differences in units of the nearest one's, by Newton's method in the dual.
-
-    Epsilon comes down to its value in steps, each from where the one before has led: at once, a colour
-    outside of all its neighbours would take hundreds of steps.
-    """
-    with np.errstate(divide="ignore"):
-        logarithm = np.log(priors)
-    unknown = np.zeros((len(priors), 3))
-    epsilon = np.maximum((differences**2).sum(axis=2).max(axis=1), _EPSILON)
+def _weights(priors: Float64Array, differences: Float64Array) -> Float64Array:
+    """The weights (n, count) of differences in units of the nearest one's, by Newton's method in the dual."""
+    ones = np.ones((*priors.shape, 1))
+    columns = np.concatenate([ones, differences], axis=2)
+    unknown = np.zeros((len(priors), 4))
+    unknown[:, 0] = 1 / priors.sum(axis=1)
     active = np.arange(len(priors))
     for _ in range(_STEPS):
-        y, k, x, e = differences[active], logarithm[active], unknown[active], epsilon[active]
-        value, weights = _dual(y, k, x, e)
-        mean = np.einsum("nk,nki->ni", weights, y)
-        gradient = mean + e[:, None] * x
-        left = np.abs(gradient).max(axis=1)
-        settled = left <= np.where(e > _EPSILON, 0.1 * e * (1 + np.abs(x).max(axis=1)), _SETTLED)
-        moving = ~(settled & (e <= _EPSILON))
+        c, k, x = columns[active], priors[active], unknown[active]
+        value, weights, gradient = _dual(c, k, x)
+        moving = np.abs(gradient).max(axis=1) > _SETTLED
         if not moving.any():
             break
-        e = np.where(settled, np.maximum(e / _FACTOR, _EPSILON), e)
-        epsilon[active] = e
-        active, y, k, x, e, weights, mean = (each[moving] for each in (active, y, k, x, e, weights, mean))
-        value, gradient = _dual(y, k, x, e)[0], mean + e[:, None] * x
-        centred = y - mean[:, None]
-        curvature = (weights[..., None] * centred).transpose(0, 2, 1) @ centred + e[:, None, None] * np.eye(3)
-        newton = -np.linalg.solve(curvature, gradient[..., None])[..., 0]
-        unknown[active] = x + _size(y, k, x, e, value, newton, (newton * gradient).sum(axis=1))[:, None] * newton
-    return _dual(differences, logarithm, unknown, epsilon)[1]
+        active, c, k, x, value, weights, gradient = (
+            each[moving] for each in (active, c, k, x, value, weights, gradient)
+        )
+        curvature = (np.where(weights > 0, k, 0.0)[..., None] * c).transpose(0, 2, 1) @ c + _RIDGE
+        step = -np.linalg.solve(curvature, gradient[..., None])[..., 0]
+        unknown[active] = x + _size(c, k, x, value, step, (step * gradient).sum(axis=1))[:, None] * step
+    weights = _dual(columns, priors, unknown)[1]
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 
 
 def _size(
-    y: Float64Array, k: Float64Array, x: Float64Array, e: Float64Array, value: Float64Array, step: Float64Array,
-    slope: Float64Array,
-) -> Float64Array:  # fmt: skip
+    c: Float64Array, k: Float64Array, x: Float64Array, value: Float64Array, step: Float64Array, slope: Float64Array
+) -> Float64Array:
     """How much (n,) of a step to go: halved until the value falls as it should."""
     size = np.ones(len(x))
     left = np.arange(len(x))
     for _ in range(_HALVINGS):
-        reached = _dual(y[left], k[left], x[left] + size[left, None] * step[left], e[left])[0]
+        reached = _dual(c[left], k[left], x[left] + size[left, None] * step[left])[0]
         left = left[reached > value[left] + 1e-4 * size[left] * slope[left] + 1e-12 * (1 + np.abs(value[left]))]
         if not len(left):
             break
@@ -159,13 +154,13 @@ def _size(
     return size
 
 
-def _dual(y: Float64Array, k: Float64Array, x: Float64Array, e: Float64Array) -> tuple[Float64Array, Float64Array]:
-    """The dual's value (n,), and the weights (n, count) that belong to it."""
-    exponent = k + (y @ x[..., None])[..., 0]
-    largest = exponent.max(axis=1, keepdims=True)
-    weights = np.exp(exponent - largest)
-    total = weights.sum(axis=1, keepdims=True)
-    return (np.log(total) + largest)[:, 0] + e / 2 * (x**2).sum(axis=1), weights / total
+def _dual(c: Float64Array, k: Float64Array, x: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """The dual's value (n,), the weights (n, count) that belong to it, and its gradient (n, 4)."""
+    pressure = np.maximum((c @ x[..., None])[..., 0], 0.0)
+    weights = k * pressure
+    gradient = (weights[:, None] @ c)[:, 0] + _EPSILON * _OF_COLOUR * x - _OF_SUM
+    value = (weights * pressure).sum(axis=1) / 2 + _EPSILON / 2 * (x[:, 1:] ** 2).sum(axis=1) - x[:, 0]
+    return value, weights, gradient
 
 
 def _gathered(

@@ -123,29 +123,37 @@ class _Search:
         colours = np.concatenate([self.colours, self.colours[-1:]])
         boxes = Boxes(*(each.reduceat(colours, _pairs(first, last))[::2] for each in (np.minimum, np.maximum)))
         lower, upper = box_bounds(boxes, box, self.points, colour)
-        # One of them may be the colour's own, which does not count.
-        wanted = self.count + (self.own is not None)
-        order = np.lexsort((upper, box)) if wanted > 1 else None
-        starts = np.cumsum(candidates.length) - candidates.length
-        if order is None:
-            limit = np.minimum.reduceat(upper, starts)
-            hits = np.flatnonzero(upper == limit[box])
-            best = colour[hits[np.searchsorted(box[hits], np.arange(len(first)))]][:, None]
-        else:
-            chosen = order[starts[:, None] + np.arange(wanted)]
-            limit, best = upper[chosen[:, -1]], colour[chosen]
+        limit, best = self._furthest(upper, box, colour, candidates.length)
         if tried:
             limit = np.minimum(limit, self._reached(first, last, best) ** 2)
         kept = lower <= limit[box] * _SLACK + _TINY
         length = np.bincount(box[kept], minlength=len(first))
         return _Lists(np.cumsum(length) - length, length, colour[kept])
 
+    def _furthest(
+        self, upper: Float64Array, box: IntArray, colour: IntArray, length: IntArray
+    ) -> tuple[Float64Array, IntArray]:
+        """Of each box the square of a dE00 within which as many as wanted are, and which (boxes, n), -1 for none."""
+        starts = np.cumsum(length) - length
+        # One of them may be the colour's own, which does not count.
+        wanted = self.count + (self.own is not None)
+        if wanted == 1:
+            limit = np.minimum.reduceat(upper, starts)
+            hits = np.flatnonzero(upper == limit[box])
+            return limit, colour[hits[np.searchsorted(box[hits], np.arange(len(length)))]][:, None]
+        # Where it is not among a box's candidates, there may be one fewer.
+        rank = np.arange(wanted)
+        order = np.lexsort((upper, box))[starts[:, None] + np.minimum(rank, length[:, None] - 1)]
+        return upper[order[:, -1]], np.where(rank < length[:, None], colour[order], -1)
+
     def _reached(self, first: IntArray, last: IntArray, members: IntArray) -> Float64Array:
-        """Of each box how far, at most, the wanted ones among some members (boxes, n) are from its colours."""
+        """Of each box how far, at most, the nearest of some members (boxes, n) are from its colours; -1 is none."""
         which, at = _expand(first, last - first)
-        dE00 = self._dE00(at[:, None], members[which])
+        members = members[which]
+        dE00 = self._dE00(at[:, None], members)
+        dE00[members < 0] = np.inf
         if self.own is not None:
-            dE00[members[which] == self.own[at, None]] = np.inf
+            dE00[members == self.own[at, None]] = np.inf
         reached = np.partition(dE00, self.count - 1, axis=1)[:, self.count - 1]
         return np.asarray(np.maximum.reduceat(reached, np.cumsum(last - first) - (last - first)))
 

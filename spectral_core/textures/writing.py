@@ -30,6 +30,22 @@ class TextureWriter(Protocol):
         """Append rows (count, width, bands)."""
 
 
+def writable_suffix(path: str | Path) -> str:
+    """The suffix of a texture that can be written.
+
+    Raises
+    ------
+    OutputError
+        If it is none of `SUFFIXES`.
+    """
+    suffix = Path(path).suffix.lower()
+    if suffix not in SUFFIXES:
+        raise OutputError(
+            f"'{suffix}' is no format that textures are written in", where=path, remedy=f"use {', '.join(SUFFIXES)}"
+        )
+    return suffix
+
+
 @contextmanager
 def texture_writer(
     path: str | Path, height: int, width: int, wavelengths_nm: Float64Array, half: bool = True
@@ -43,19 +59,13 @@ def texture_writer(
     OutputError
         If the suffix is none of these, or the file cannot be written.
     """
-    path = Path(path)
-    make = {".npz": _npz, ".npy": _npy, ".exr": _exr}.get(path.suffix.lower())
-    if make is None:
-        raise OutputError(
-            f"'{path.suffix}' is no format of textures that is written", where=path,
-            remedy=f"name it {', '.join(SUFFIXES)}",
-        )  # fmt: skip
+    path, make = Path(path), {".npz": _npz, ".npy": _npy, ".exr": _exr}[writable_suffix(path)]
     with ExitStack() as stack:
         temporary = stack.enter_context(atomic_path(path))
         writer = stack.enter_context(
             make(temporary, (height, width, len(wavelengths_nm)), wavelengths_nm, "float16" if half else "float32")
         )
-        if path.suffix.lower() == ".npy":
+        if writable_suffix(path) == ".npy":
             beside = stack.enter_context(atomic_path(path.with_name(f"{path.stem}.wavelengths.csv")))
             text = "\n".join(repr(float(nm)) for nm in wavelengths_nm)
             beside.write_text(f"# nm\n{text}\n", encoding="utf-8")

@@ -26,7 +26,7 @@ from spectral_core.assigning.tally import Tally
 from spectral_core.errors import SpectrumError
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
-from spectral_core.textures.writing import TextureWriter, texture_writer
+from spectral_core.textures.writing import TextureWriter, texture_writer, writable_suffix
 
 Progress = Callable[[float, str], None]
 
@@ -183,6 +183,7 @@ def assign(
     SpectralBoothError
         If an input cannot be used or the output not be written.
     """
+    writable_suffix(output)
     image = RgbImage(texture)
     means = code_colours(image, light.XYZ(observer), None if icc is None else Path(icc), profile)
     if judges and library is None:
