@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from spectral_core.assigning import assign, read_library
     from spectral_core.baking import bake
     from spectral_core.display import DisplayProfile, load_profile
     from spectral_core.lights import Light
@@ -26,10 +27,12 @@ _HOME = {
     "Light": "lights",
     "Spectra": "spectra",
     "WeightingFactors": "weights",
+    "assign": "assigning",
     "bake": "baking",
     "load_profile": "display",
     "load_scene": "scene",
     "open_texture": "textures",
+    "read_library": "assigning",
     "read_spectra": "spectra",
     "weighting_factors": "weights",
 }
@@ -40,10 +43,12 @@ __all__ = [
     "Light",
     "Spectra",
     "WeightingFactors",
+    "assign",
     "bake",
     "load_profile",
     "load_scene",
     "open_texture",
+    "read_library",
     "read_spectra",
     "weighting_factors",
 ]

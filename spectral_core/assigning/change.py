@@ -15,6 +15,7 @@ EDGE = 1e-6
 # How far a change itself counts beside its second differences: keeps it from drifting where the lamp is dark.
 _SIZE = 1e-3
 _ROUNDS = 60
+_RANK = 1e-9
 _COLOURS = 1 << 14
 
 
@@ -22,7 +23,7 @@ def smoothest_change(wavelengths_nm: Float64Array, factors: Float64Array) -> Flo
     """What (3, bands) a reflectance changes by per unit of X, Y and Z.
 
     Of all changes with that colour the one with the least integral of its squared second derivative, and a
-    little of its square.
+    little of its square. Under a lamp of one or two lines, which cannot show every colour, the nearest it can.
 
     Parameters
     ----------
@@ -32,7 +33,10 @@ def smoothest_change(wavelengths_nm: Float64Array, factors: Float64Array) -> Flo
         Weighting factors (bands, 3).
     """
     softness = np.linalg.inv(_bend(wavelengths_nm))
-    return np.asarray(np.linalg.solve(factors.T @ softness @ factors, factors.T @ softness))
+    # Under two lines colours differ in two ways only: what they cannot show stays undone.
+    return np.asarray(
+        np.linalg.pinv(factors.T @ softness @ factors, rcond=_RANK, hermitian=True) @ factors.T @ softness
+    )
 
 
 def _bend(wavelengths_nm: Float64Array) -> Float64Array:
@@ -54,7 +58,8 @@ def with_colours(
 ) -> Float64Array:
     """Reflectances (n, bands) changed smoothly so that their colours are XYZ (n, 3).
 
-    Within 0..1 where some rounds of cutting and changing again get there; the colour is met in any case.
+    Within 0..1 where some rounds of cutting and changing again get there; the colour is met in any case, but for
+    what the lamp cannot show.
     """
     change = smoothest_change(wavelengths_nm, factors)
     result = reflectances + (XYZ - reflectances @ factors) @ change
@@ -82,6 +87,7 @@ class Exact:
         self._source, self._white = source, light.XYZ(observer)
         self._factors = light.weighting_factors(source.wavelengths_nm, observer).matrix
         self._change = smoothest_change(source.wavelengths_nm, self._factors)
+        self._effect = self._change @ self._factors
         self.table = np.concatenate([source.table, self._change])
 
     def choose(self, XYZ: Float64Array, own: IntArray | None = None) -> Choice:
@@ -92,7 +98,7 @@ class Exact:
             part = slice(first, first + _COLOURS)
             missing[part] = self._missing(XYZ[part], found.part(part).spectra(self._source.table))
         # Less of a difference in XYZ is less of one in dE00, but where hues turn over.
-        dE00 = standards.dE00(XYZ, self._colours(found) + missing, self._white)
+        dE00 = standards.dE00(XYZ, self._colours(found) + missing @ self._effect, self._white)
         worse = dE00 > found.dE00
         missing[worse] = 0.0
         weights = np.ones(found.rows.shape) if found.weights is None else found.weights

@@ -16,6 +16,7 @@ import numpy as np
 from spectral_core.arrays import Float64Array
 from spectral_core.assigning.icc_codes import IccProfile
 from spectral_core.assigning.image import RgbImage
+from spectral_core.chromaticities import XYZ_to_xy
 from spectral_core.display import DisplayProfile, load_profile, srgb
 from spectral_core.display.export.icc import D50, adaptation
 from spectral_core.display.models.corrected import drive_of_lightness
@@ -23,6 +24,8 @@ from spectral_core.errors import DisplayError
 from spectral_core.files import is_file, why_no_file
 
 _LARGEST_ICC_MB = 64
+# In x and y: real lamps of 5000 K.
+_LIKE_D50 = 0.01
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,17 @@ def _by_display(profile: DisplayProfile, lamp_XYZ: Float64Array, warnings: tuple
 
 def _by_icc(data: bytes, where: Path, lamp_XYZ: Float64Array, whose: str = "") -> CodeColours:
     profile, to_lamp = IccProfile(data, where), between(D50, lamp_XYZ)
-    return CodeColours(f"ICC profile{whose}: {profile.name}", lambda codes: _XYZ_D50(profile.Lab(codes)) @ to_lamp.T)
+    warnings: tuple[str, ...] = ()
+    if profile.of_input and np.abs(XYZ_to_xy(lamp_XYZ) - XYZ_to_xy(D50)).max() > _LIKE_D50:
+        warnings = (
+            "profiles of scanners and cameras mostly say what their test chart's colours are under D50, whatever the "
+            "lamp: give --light D50 unless this one was made from colours under the lamp itself",
+        )
+    return CodeColours(
+        f"ICC profile{whose}: {profile.name}",
+        lambda codes: np.asarray(_XYZ_D50(profile.Lab(codes)) @ to_lamp.T),
+        warnings,
+    )
 
 
 def between(white: Float64Array, other: Float64Array) -> Float64Array:

@@ -38,6 +38,8 @@ class IccProfile:
     ----------
     name
         As it calls itself, and its class.
+    of_input
+        Whether it is of a scanner or camera.
 
     Raises
     ------
@@ -58,6 +60,7 @@ class IccProfile:
         if space != "RGB" or kind not in _CLASSES:
             raise _refused(f"is an ICC profile of class '{kind}' for {space}", where)
         self.name = f"{' '.join(name.split())[:80]} ({_CLASSES[kind]})"
+        self.of_input = kind == "scnr"
         try:
             self._transforms = [
                 cms.buildTransform(self._profile, _grey_profile(axis), "RGB", "I;16",

@@ -10,6 +10,7 @@ is right.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -75,6 +76,7 @@ class Recovered:
         table = np.array([values for _, values in spectra]) @ interpolation_operator(own, self.wavelengths_nm).T
         factors = light.weighting_factors(self.wavelengths_nm, observer).matrix
         self.table = with_colours(table, nodes @ self._to_XYZ.T, self.wavelengths_nm, factors)
+        self._XYZ = self.table @ factors
         beyond = ((self.table < -EDGE) | (self.table > 1 + EDGE)).any(axis=1).sum()
         self.warnings = (
             (f"{beyond} of {len(nodes)} colours of the lattice have no reflectance within 0..1 under {light.name}",)
@@ -86,9 +88,9 @@ class Recovered:
         RGB = np.linalg.solve(self._to_XYZ, XYZ.T).T
         inside = np.clip(RGB, 0.0, 1.0)
         rows, weights = self._tetrahedra(inside)
-        dE00 = standards.dE00(XYZ, inside @ self._to_XYZ.T, self._white)
         outside = (np.abs(inside - RGB) > 1e-4).any(axis=1)
-        return Choice(rows, weights, dE00, np.asarray(outside))
+        found = Choice(rows, weights, np.zeros(len(XYZ)), np.asarray(outside))
+        return replace(found, dE00=standards.dE00(XYZ, found.spectra(self._XYZ), self._white))
 
     def _tetrahedra(self, RGB: Float64Array) -> tuple[IntArray, Float64Array]:
         """The four nodes round each colour and their weights, both (n, 4): six tetrahedra share a cell's diagonal."""

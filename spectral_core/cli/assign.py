@@ -13,6 +13,7 @@ from spectral_core.assigning import Assignment, read_library
 from spectral_core.assigning import assign as run
 from spectral_core.cli.console import Document, emit, facts, progress_bar, rounded, table
 from spectral_core.cli.options import FiniteRange, as_json, observer_option
+from spectral_core.errors import SpectrumError
 from spectral_core.lights import Light
 from spectral_core.standards import RECOVERY_METHODS
 
@@ -59,6 +60,8 @@ def assign(
     recovered from colour alone. --judge leaves each reflectance of the library out in turn and
     predicts its colour under another light.
     """
+    if step is not None and not libraries:
+        raise SpectrumError("--step is for a library", remedy="leave it out, or give --library")
     library = read_library(libraries, step) if libraries else None
     lamp, others = Light.load(light), [Light.load(each) for each in judges]
     with progress_bar(f"assigning {texture.name}") as progress:

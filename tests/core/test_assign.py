@@ -292,6 +292,21 @@ def test_exact_stays_within_what_a_surface_can_be() -> None:
     assert spectra.max() <= max(1, values.max()) + 1e-9
 
 
+@pytest.mark.parametrize("lamp", ["two-peaks-d65", "LPS"])
+@pytest.mark.parametrize("how", [{"exact": True}, {"mix": 4, "exact": True}, {"recover": "smits"}])
+def test_lamps_that_cannot_show_every_colour(lamp: str, how: dict[str, Any]) -> None:
+    """Two lines, and one: what is reported is what is reached, and no worse than without the change."""
+    light, library = Light.builtin(lamp), smooth_library(30)
+    colours = library.XYZ(light)[:20] * [1.02, 1.0, 0.97]
+    source = spectra_source(light, None if "recover" in how else library, **how)
+    found = source.choose(colours)
+    XYZ = found.spectra(source.table) @ light.weighting_factors(source.wavelengths_nm).matrix
+    np.testing.assert_allclose(found.dE00, standards.dE00(XYZ, colours, light.XYZ()), atol=1e-6)
+    if "recover" not in how:
+        single = spectra_source(light, library).choose(colours)
+        assert (found.dE00 <= single.dE00 + 1e-9).all()
+
+
 # --- recovered
 
 
@@ -403,7 +418,7 @@ def test_codes_of_16_bits_lie_between_those_of_8() -> None:
     assert standards.delta_E_2000(profile.Lab(codes), Lab)[light].max() < 0.03
 
 
-def test_a_scanners_white_is_not_the_perfect_diffuser() -> None:
+def test_a_scanners_white_is_not_the_perfect_diffuser(image: RgbImage, tmp_path: Path) -> None:
     """The same profile as a scanner's with a medium of 80 %: its white has Y = 0.8, and chroma is scaled with it."""
     data = bytearray(srgb_icc())
     data[12:16] = b"scnr"
@@ -419,6 +434,10 @@ def test_a_scanners_white_is_not_the_perfect_diffuser() -> None:
     Lab = profile.Lab(np.ones((1, 3)))[0]
     assert Lab[0] == pytest.approx(116 * np.cbrt(0.8) - 16, abs=0.01)
     np.testing.assert_allclose(Lab[1:], 0, atol=0.02)
+    path = tmp_path / "s.icc"
+    path.write_bytes(data)
+    assert "D50" in code_colours(image, FL11.XYZ(), icc=path).warnings[0]
+    assert code_colours(image, Light.builtin("D50").XYZ(), icc=path).warnings == ()
 
 
 def test_without_a_profile_srgb_is_taken_and_said(image: RgbImage) -> None:
@@ -566,6 +585,7 @@ def test_the_command(run: Run, tmp_path: Path) -> None:
         (["--light", "D65", "--library", "colorchecker", "--profile", "x.json"], "x.json"),
         (["--light", "D65", "--library", "colorchecker", "--icc", "x.icc"], "x.icc"),
         (["--light", "D65", "--library", "colorchecker", "--step", "nan"], "nan"),
+        (["--light", "D65", "--recover", "smits", "--step", "5"], "--step is for a library"),
     ],
 )
 def test_bad_arguments(run: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
