@@ -10,6 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from spectral_core.assigning import assign, read_library
     from spectral_core.baking import bake, bake_to_memory, level2_weights, project
     from spectral_core.display import DisplayProfile, load_profile
     from spectral_core.lights import Light
@@ -28,6 +29,7 @@ _HOME = {
     "Reading": "textures",
     "Spectra": "spectra",
     "WeightingFactors": "weights",
+    "assign": "assigning",
     "bake": "baking",
     "bake_to_memory": "baking",
     "level2_weights": "baking",
@@ -35,6 +37,7 @@ _HOME = {
     "load_scene": "scene",
     "open_texture": "textures",
     "project": "baking",
+    "read_library": "assigning",
     "read_spectra": "spectra",
     "weighting_factors": "weights",
 }
@@ -47,6 +50,7 @@ __all__ = [
     "Reading",
     "Spectra",
     "WeightingFactors",
+    "assign",
     "bake",
     "bake_to_memory",
     "level2_weights",
@@ -54,6 +58,7 @@ __all__ = [
     "load_scene",
     "open_texture",
     "project",
+    "read_library",
     "read_spectra",
     "weighting_factors",
 ]

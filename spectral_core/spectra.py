@@ -23,6 +23,8 @@ _VISIBLE_NM = (360.0, 830.0)
 _LARGEST_REFLECTANCE = 2.0
 # 0.02 nm over the visible range; finer tables only cost memory.
 _MOST_WAVELENGTHS = 20_000
+# The text that every MATLAB file since version 5 begins with.
+_MATLAB = b"MATLAB "
 
 
 @dataclass(frozen=True)
@@ -58,7 +60,7 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
 
     CSV: first column nm, one column a spectrum, header optional. Comma, semicolon or tab separated;
     ``#`` starts a comment; ``# kind: lines`` makes every row an exact spectral line. A table from
-    long to short wavelengths is turned round.
+    long to short wavelengths is turned round. A MATLAB file is read as `spectral_core.matlab_spectra` says.
 
     Raises
     ------
@@ -70,6 +72,8 @@ def read_spectra(path: str | Path, quantity: Quantity) -> Spectra:
 
     if spectral_library.is_envi(path):
         return _from_library(path, quantity)
+    if _starts_with(path, _MATLAB):
+        return _matlab(path, quantity)
     rows, lines = _rows(path)
     header, body = _split_header(path, rows)
     width = len(_cells(path, *body[0]))
@@ -109,6 +113,36 @@ def _from_library(path: Path, quantity: Quantity) -> Spectra:
         bool(library.names),
         warnings=(*library.warnings, *warnings),
     )
+
+
+def _matlab(path: Path, quantity: Quantity) -> Spectra:
+    from spectral_core import matlab_spectra  # which needs textures, which may need tables of spectra
+
+    wavelengths, values = matlab_spectra.matlab_table(path)
+    if not (np.isfinite(wavelengths).all() and np.isfinite(values).all()):
+        raise SpectrumError("holds something that is not a finite number", where=path, remedy="correct it")
+    order = np.argsort(wavelengths, kind="stable")
+    wavelengths, values = wavelengths[order], values[:, order]
+    repeated = wavelengths[1:][np.diff(wavelengths) == 0]
+    if len(repeated):
+        raise SpectrumError(f"wavelength {repeated[0]:g} nm occurs twice", where=path, remedy="keep one of them")
+    if len(wavelengths) > _MOST_WAVELENGTHS:
+        raise SpectrumError(
+            f"{len(wavelengths)} wavelengths, more than {_MOST_WAVELENGTHS}", where=path, remedy="average"
+        )
+    _check_wavelengths(path, wavelengths, needs_curve=True)
+    warnings = _check_values(path, wavelengths, values, quantity)
+    names = tuple(str(index + 1) for index in range(len(values)))
+    return Spectra(names, frozen(wavelengths), frozen(values), named=False, warnings=tuple(warnings))
+
+
+def _starts_with(path: Path, signature: bytes) -> bool:
+    """False for what cannot be read: whoever reads it next says why."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(signature)) == signature
+    except (OSError, ValueError):
+        return False
 
 
 def write_spectra(

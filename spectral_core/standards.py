@@ -16,7 +16,7 @@ from unittest.mock import NonCallableMock
 import numpy as np
 
 from spectral_core.arrays import Float64Array, frozen
-from spectral_core.errors import LightError, SpectrumError
+from spectral_core.errors import LightError, MissingExtraError, SpectrumError
 
 OBSERVERS = {
     "cie1931-2": "CIE 1931 2 Degree Standard Observer",
@@ -25,6 +25,11 @@ OBSERVERS = {
     "cie2015-10": "CIE 2015 10 Degree Standard Observer",
 }
 DEFAULT_OBSERVER = "cie1931-2"
+# Smits 1999, Mallett & Yuksel 2019, Otsu et al. 2018, Jakob & Hanika 2019, Meng et al. 2015.
+RECOVERY_METHODS = {
+    "smits": "Smits1999", "mallett": "Mallett2019", "otsu": "Otsu2018", "jakob": "Jakob2019", "meng": "Meng2015",
+}  # fmt: skip
+NEED_SCIPY = ("jakob", "meng")
 # Colour spaces that displays are compared with, all with a D65 white, by colour-science's names.
 GAMUTS = {"sRGB": "sRGB", "P3": "Display P3", "Rec.2020": "ITU-R BT.2020"}
 
@@ -205,3 +210,55 @@ def _finite(value: float, name: str) -> float:
             f"{name} is undefined for this spectrum", remedy="give a spectrum with power from 380 to 780 nm"
         )
     return value
+
+
+def recovered_reflectance(method: str, XYZ: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """Wavelengths (n,) and reflectance (n,) that a method of colour-science recovers for one XYZ (3,) under D65.
+
+    For ``smits`` and ``mallett`` the XYZ must be of the sRGB gamut, white Y = 1.
+
+    Raises
+    ------
+    MissingExtraError
+        For ``jakob`` and ``meng`` without scipy.
+    SpectrumError
+        If the method does not come to an end for this colour.
+    """
+    colour = _colour()
+    if method in NEED_SCIPY and not _has_scipy():
+        raise MissingExtraError(
+            f"the recovery method '{method}' needs scipy", remedy="pip install scipy, or use smits, mallett or otsu"
+        )
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        if method in ("smits", "mallett"):
+            # Relative to white both bases are 1 throughout: white is (1, 1, 1) for either's own lamp.
+            function = getattr(colour.recovery, f"RGB_to_sd_{RECOVERY_METHODS[method]}")
+            found = function(np.linalg.solve(srgb_to_XYZ_matrix(), XYZ))
+        else:
+            try:
+                found = getattr(colour.recovery, f"XYZ_to_sd_{RECOVERY_METHODS[method]}")(
+                    XYZ, **_recovery_tables(method)
+                )
+            except (RuntimeError, ValueError) as error:
+                raise SpectrumError(
+                    f"'{method}' recovers nothing for XYZ {XYZ} ({error})", remedy="use another method"
+                ) from None
+    return np.asarray(found.wavelengths, dtype=np.float64), np.asarray(found.values, dtype=np.float64)
+
+
+@cache
+def _recovery_tables(method: str) -> dict[str, Any]:
+    """Observer and D65 on the method's own grid; colour-science would align them for every colour."""
+    colour = _colour()
+    shape = colour.recovery.SPECTRAL_SHAPE_OTSU2018 if method == "otsu" else colour.SpectralShape(360, 780, 10)
+    cmfs = colour.MSDS_CMFS[OBSERVERS[DEFAULT_OBSERVER]].copy().align(shape)
+    return {"cmfs": cmfs, "illuminant": colour.SDS_ILLUMINANTS["D65"].copy().align(shape)}
+
+
+def _has_scipy() -> bool:
+    try:
+        import scipy.optimize
+    except ImportError:
+        return False
+    return bool(scipy.optimize)

@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from spectral_core import documents
+from spectral_core.cli.assign import add_assign_command
 from spectral_core.cli.blender import add_blender_commands
 from spectral_core.cli.compare import add_compare_command
 from spectral_core.cli.console import emit, facts, rounded, table
@@ -117,6 +118,7 @@ add_profile_commands(cli)
 add_luminance_commands(cli)
 add_probe_command(cli)
 add_compare_command(cli)
+add_assign_command(cli)
 add_patch_commands(cli)
 add_texture_commands(cli)
 add_blender_commands(cli)

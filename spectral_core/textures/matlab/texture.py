@@ -45,7 +45,7 @@ class MatlabTexture(HyperspectralTexture):
     """
 
     def __init__(self, path: Path, reading: Reading) -> None:
-        file = _opened(path)
+        file = open_mat_file(path)
         cube = _chosen(file.variables, reading, path)
         self.format = file.format
         self.name, self.part = path.stem, cube.name
@@ -60,7 +60,7 @@ class MatlabTexture(HyperspectralTexture):
         return self._rows(first, count)
 
 
-def _opened(path: Path) -> MatFile:
+def open_mat_file(path: Path) -> MatFile:
     """The reader for a file, known by its first bytes."""
     with path.open("rb") as stream:
         return Mat5File(path) if stream.read(8) == b"MATLAB 5" else Mat73File(path)
