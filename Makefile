@@ -42,6 +42,9 @@ app: $(VENV)/ready
 benchmarks: $(VENV)/ready
 	$(VENV)/bin/python benchmarks/weighting_factors.py
 	$(VENV)/bin/python benchmarks/display_speed.py
+	$(VENV)/bin/python benchmarks/projection.py
+	$(VENV)/bin/python benchmarks/bake_memory.py
+	$(VENV)/bin/python benchmarks/assigning.py
 
 system-libraries:
 	sh tools/system_libraries.sh
