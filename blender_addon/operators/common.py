@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import bpy
 
@@ -53,3 +54,73 @@ def busy(context: bpy.types.Context) -> Iterator[None]:
         yield
     finally:
         manager.progress_end()
+
+
+class Stepped:
+    """Mix-in of operators whose work comes in steps.
+
+    In a window one step per timer event, so that Blender stays alive and Esc can stop it; elsewhere all at once.
+    """
+
+    stopped_text = "Stopped"
+    _steps: Generator[Any, None, Any]
+
+    def _start(self, context: bpy.types.Context) -> Generator[Any, None, Any]:
+        """The steps; what they return goes to `_store`. Closing them leaves everything as it was."""
+        raise NotImplementedError
+
+    def _store(self, context: bpy.types.Context, result: Any) -> None:
+        """Keep what the steps returned."""
+        raise NotImplementedError
+
+    def _progress(self, step: Any) -> tuple[float, str]:
+        """Fraction done and what is being done."""
+        raise NotImplementedError
+
+    def run_in_steps(self, context: bpy.types.Context) -> set[str]:
+        """Begin; `modal` goes on."""
+        with reported(self) as outcome:  # type: ignore[arg-type]
+            self._steps = self._start(context)
+            manager = context.window_manager
+            self._timer = manager.event_timer_add(0.01, window=context.window)
+            manager.progress_begin(0, 1)
+            manager.modal_handler_add(self)
+            outcome.status = {"RUNNING_MODAL"}
+        return outcome.status
+
+    def run_at_once(self, context: bpy.types.Context) -> set[str]:
+        """All steps."""
+        with reported(self) as outcome, busy(context):  # type: ignore[arg-type]
+            self._steps = self._start(context)
+            try:
+                while True:
+                    context.window_manager.progress_update(self._progress(next(self._steps))[0])
+            except StopIteration as finished:
+                self._store(context, finished.value)
+        return outcome.status
+
+    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        """One step per timer event; all other events wait, so that nothing changes meanwhile."""
+        if event.type == "ESC":
+            self._end(context)
+            self.report({"WARNING"}, self.stopped_text)  # type: ignore[attr-defined]
+            return {"CANCELLED"}
+        if event.type != "TIMER":
+            return {"RUNNING_MODAL"}
+        with reported(self) as outcome:  # type: ignore[arg-type]
+            try:
+                fraction, what = self._progress(next(self._steps))
+            except StopIteration as finished:
+                self._store(context, finished.value)
+            else:
+                context.window_manager.progress_update(fraction)
+                context.workspace.status_text_set(f"{what} ({fraction:.0%}). Esc cancels")
+                return {"RUNNING_MODAL"}
+        self._end(context)
+        return outcome.status
+
+    def _end(self, context: bpy.types.Context) -> None:
+        self._steps.close()
+        context.window_manager.event_timer_remove(self._timer)
+        context.window_manager.progress_end()
+        context.workspace.status_text_set(None)

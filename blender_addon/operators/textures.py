@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from .common import reported
+from .common import Stepped
 
 if TYPE_CHECKING:
     from spectral_core.baking import BakedArrays
@@ -21,7 +21,7 @@ KINDS = (
 )
 
 
-class BakeTexture(bpy.types.Operator):
+class BakeTexture(Stepped, bpy.types.Operator):
     """Compute the exact colours of a hyperspectral texture under lights, one new image each"""
 
     bl_idname = "spectral_booth.bake_texture"
@@ -48,48 +48,24 @@ class BakeTexture(bpy.types.Operator):
         name="Wavelengths", description="first:last:step in nm, if the file does not say them"
     )
 
+    stopped_text = "Bake cancelled; no image was made"
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """Ask for the file first; then, in a window, one step at a time, so that Esc can stop it."""
-        if not self.filepath:
-            context.window_manager.fileselect_add(self)
-            return {"RUNNING_MODAL"}
-        return self.execute(context)
+        """Ask for the file if none was given."""
+        if self.filepath:
+            return self.execute(context)
+        context.window_manager.fileselect_add(self)
+        return {"RUNNING_MODAL"}
 
     def execute(self, context: bpy.types.Context) -> set[str]:
-        """Bake: in the background or from a script all at once."""
-        with reported(self) as outcome:
-            self._start()
-            if bpy.app.background or context.window is None or not self.options.is_invoke:
-                self._finish(context)
-                return outcome.status
-            manager = context.window_manager
-            self._timer = manager.event_timer_add(0.01, window=context.window)
-            manager.progress_begin(0, 1)
-            manager.modal_handler_add(self)
-            outcome.status = {"RUNNING_MODAL"}
-        return outcome.status
+        """In a window, when a user asks for it, in steps; from a script all at once."""
+        in_window = not bpy.app.background and context.window is not None and self.options.is_invoke
+        return self.run_in_steps(context) if in_window else self.run_at_once(context)
 
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """One strip per timer event; Esc stops, and no image is made."""
-        if event.type == "ESC":
-            self._end(context)
-            self.report({"WARNING"}, "Bake cancelled; no image was made")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        with reported(self) as outcome:
-            try:
-                fraction = next(self._steps)
-            except StopIteration as finished:
-                self._store(finished.value)
-            else:
-                context.window_manager.progress_update(fraction)
-                context.workspace.status_text_set(f"Baking {self._texture.name} ({fraction:.0%}). Esc cancels")
-                return {"RUNNING_MODAL"}
-        self._end(context)
-        return outcome.status
+    def _progress(self, step: float) -> tuple[float, str]:
+        return step, f"Baking {self._texture.name}"
 
-    def _start(self) -> None:
+    def _start(self, context: bpy.types.Context) -> Generator[float, None, BakedArrays]:
         from spectral_core.baking import baking_steps
         from spectral_core.errors import TextureError
         from spectral_core.lights import Light
@@ -107,34 +83,17 @@ class BakeTexture(bpy.types.Operator):
             wavelengths=self.wavelengths or None,
         )
         self._texture = open_texture(bpy.path.abspath(self.filepath), reading)
-        self._steps: Generator[float, None, BakedArrays] = baking_steps(self._texture, self._lights)
+        return baking_steps(self._texture, self._lights)
 
-    def _finish(self, context: bpy.types.Context) -> None:
-        manager = context.window_manager
-        manager.progress_begin(0, 1)
-        try:
-            while True:
-                manager.progress_update(next(self._steps))
-        except StopIteration as finished:
-            self._store(finished.value)
-        finally:
-            manager.progress_end()
-
-    def _store(self, baked: BakedArrays) -> None:
+    def _store(self, context: bpy.types.Context, result: BakedArrays) -> None:
         from ..bridge.images import new_image
 
-        for light, pixels, clipped in zip(self._lights, baked.images, baked.clipped_fractions, strict=True):
+        for light, pixels, clipped in zip(self._lights, result.images, result.clipped_fractions, strict=True):
             image = new_image(f"{self._texture.name} under {light.name}", pixels)
             outside = f"; {clipped:.1%} of it outside sRGB" if clipped else ""
             self.report({"INFO"}, f"Image '{image.name}' made{outside}")
-        for warning in baked.warnings:
+        for warning in result.warnings:
             self.report({"WARNING"}, warning)
-
-    def _end(self, context: bpy.types.Context) -> None:
-        self._steps.close()  # no thread goes on
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
 
 
 def _path(text: str) -> Path | None:

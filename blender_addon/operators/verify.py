@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import bpy
 
-from .common import ManagedScene, reported
+from .common import ManagedScene, Stepped
 
 if TYPE_CHECKING:
     from spectral_core.verification import LightResult
@@ -21,7 +21,7 @@ LIGHTS = (
 )
 
 
-class VerifyScene(ManagedScene, bpy.types.Operator):
+class VerifyScene(ManagedScene, Stepped, bpy.types.Operator):
     """Render the scene at every level and compare the pixels with the exact colours"""
 
     bl_idname = "spectral_booth.verify"
@@ -33,51 +33,20 @@ class VerifyScene(ManagedScene, bpy.types.Operator):
         name="Write JSON", description="Write the figures beside the .blend, NAME.verify.json", default=False
     )
 
+    stopped_text = "Verification cancelled; the scene is as it was"
+
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         """In a window: one render at a time, Esc cancels."""
-        if bpy.app.background:
-            return self.execute(context)
-        with reported(self) as outcome:
-            self._start(context)
-            manager = context.window_manager
-            self._timer = manager.event_timer_add(0.01, window=context.window)
-            manager.progress_begin(0, 1)
-            manager.modal_handler_add(self)
-            outcome.status = {"RUNNING_MODAL"}
-        return outcome.status
-
-    def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
-        """One step per timer event; all other events wait, so that nothing changes meanwhile."""
-        if event.type == "ESC":
-            self._end(context)
-            self.report({"WARNING"}, "Verification cancelled; the scene is as it was")
-            return {"CANCELLED"}
-        if event.type != "TIMER":
-            return {"RUNNING_MODAL"}
-        with reported(self) as outcome:
-            try:
-                step = next(self._steps)
-            except StopIteration as finished:
-                self._store(context, finished.value)
-            else:
-                context.window_manager.progress_update(step.fraction)
-                context.workspace.status_text_set(f"Verifying {step.what} ({step.fraction:.0%}). Esc cancels")
-                return {"RUNNING_MODAL"}
-        self._end(context)
-        return outcome.status
+        return self.execute(context) if bpy.app.background else self.run_in_steps(context)
 
     def execute(self, context: bpy.types.Context) -> set[str]:
         """From a script or in the background: all at once."""
-        with reported(self) as outcome:
-            self._start(context)
-            try:
-                while True:
-                    next(self._steps)
-            except StopIteration as finished:
-                self._store(context, finished.value)
-        return outcome.status
+        return self.run_at_once(context)
 
-    def _start(self, context: bpy.types.Context) -> None:
+    def _progress(self, step: Step) -> tuple[float, str]:
+        return step.fraction, f"Verifying {step.what}"
+
+    def _start(self, context: bpy.types.Context) -> Generator[Step, None, list[LightResult]]:
         from ..bridge import state
         from ..bridge.verify import json_path, verify_steps
 
@@ -87,18 +56,12 @@ class VerifyScene(ManagedScene, bpy.types.Operator):
         current = scene.spectral_booth.light
         lights = [current] if self.lights == "CURRENT" else list(state.description(scene).lights)
         self._started = time.perf_counter()
-        self._steps: Generator[Step, None, list[LightResult]] = verify_steps(scene, lights)
+        return verify_steps(scene, lights)
 
-    def _store(self, context: bpy.types.Context, results: list[LightResult]) -> None:
+    def _store(self, context: bpy.types.Context, result: list[LightResult]) -> None:
         from ..bridge import verify
 
-        context.scene.spectral_booth.result = verify.summary(results)
+        context.scene.spectral_booth.result = verify.summary(result)
         if self.write_json:
-            path = verify.write_json(context.scene, results, time.perf_counter() - self._started)
+            path = verify.write_json(context.scene, result, time.perf_counter() - self._started)
             self.report({"INFO"}, f"Wrote {path}")
-
-    def _end(self, context: bpy.types.Context) -> None:
-        self._steps.close()  # puts the scene's own light back
-        context.window_manager.event_timer_remove(self._timer)
-        context.window_manager.progress_end()
-        context.workspace.status_text_set(None)

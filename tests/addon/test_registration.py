@@ -51,7 +51,7 @@ def test_unregister_leaves_nothing_and_register_works_again() -> None:
         assert bare[1] is False
     finally:
         blender_addon.register()
-    assert len(registered[0]) == 14  # ten operators, a menu and three panels
+    assert len(registered[0]) == 15  # eleven operators, a menu and three panels
 
 
 def test_registration_imports_neither_the_core_nor_colour_science() -> None:
