@@ -69,6 +69,12 @@ def test_verifying_in_the_window_shows_its_result_in_the_panel(window: dict) -> 
     assert float(in_gamut[1]) < 0.2
 
 
+def test_a_texture_is_baked_in_the_window(window: dict) -> None:
+    """In steps, as Blender's window stays alive; half of D65 is half in sRGB to 1e-4."""
+    assert window["bake"] == ["RUNNING_MODAL"]
+    assert window["baked"] == pytest.approx([0.5] * 3, abs=2e-4)
+
+
 def test_the_panel_was_photographed(window: dict) -> None:
     assert window["start"] == window["panel"] == 0
     # A black screen compresses to a few kB: something was drawn.

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 sys.path.append(str(Path(__file__).parent))
 from steps import play, view
@@ -69,6 +70,7 @@ def steps(found: dict[str, object]) -> Iterator[None]:
     while not scene.spectral_booth.result:
         yield
     found["result"] = scene.spectral_booth.result
+    yield from _bake(found)
     # Only now: in software the viewport takes longer to draw than all else together.
     space = view()["space_data"]
     space.shading.type = "RENDERED"
@@ -79,6 +81,20 @@ def steps(found: dict[str, object]) -> Iterator[None]:
     _photograph(found, "panel")
     bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "booth.blend"))
     found["saved"] = state(scene)
+
+
+def _bake(found: dict[str, object]) -> Iterator[None]:
+    """A texture of one grey, as counts, into an image."""
+    path = FOLDER / "grey.npz"
+    grey = np.full((300, 200, 5), 2000, dtype=np.uint16)
+    np.savez(path, counts=grey, wavelengths_nm=np.array([400.0, 480.0, 560.0, 640.0, 720.0]))
+    with bpy.context.temp_override(**view()):
+        found["bake"] = sorted(
+            bpy.ops.spectral_booth.bake_texture("INVOKE_DEFAULT", filepath=str(path), lights="D65", scale=4000.0)
+        )
+    while "grey under D65" not in bpy.data.images:
+        yield
+    found["baked"] = list(bpy.data.images["grey under D65"].pixels[:3])
 
 
 def _photograph(found: dict[str, object], name: str) -> None:
