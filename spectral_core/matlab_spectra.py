@@ -1,24 +1,47 @@
-"""Tables of spectra in MATLAB files: variables ``data`` and ``wavelength``, as ISETCam's reflectances have."""
+"""Tables of spectra in MATLAB files: variables ``data`` and ``wavelength``, as ISETCam's reflectances have.
+
+The format is that of version 5 to 7 (MAT-File Format, MathWorks): tagged elements, of which only these two are
+read. scipy's reader is not used: it can be made to crash by damaged files.
+"""
 
 from __future__ import annotations
 
 import math
+import struct
+import zlib
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
 from spectral_core.arrays import Float64Array
-from spectral_core.errors import MissingExtraError, SpectrumError
+from spectral_core.errors import SpectrumError
 
 # The text that every MATLAB file since version 5 begins with.
 SIGNATURE = b"MATLAB "
-_HDF5 = b"MATLAB 7.3"
-_NUMBERS = ("double", "single", "int8", "uint8", "int16", "uint16", "int32", "uint32", "int64", "uint64")
-# 64 MB of float64: far more than any library.
-_MOST_NUMBERS = 8 << 20
+_HEADER = 128
+_MATRIX, _COMPRESSED = 14, 15
+# Types of stored numbers, by their code in a tag.
+_STORED = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
+# Classes of arrays of numbers: double to uint64.
+_NUMBERS = range(6, 16)
+_COMPLEX = 0x800
+_WANTED = ("data", "wavelength")
+# Far more than any library of reflectances.
 _LARGEST_BYTES = 64 << 20
+_MOST_VARIABLES = 1000
+# Enough of a compressed variable to know its name.
+_NAME_WITHIN = 512
 _REMEDY = "give variables 'data', one column a spectrum, and 'wavelength' in nm"
+
+
+class _Element(NamedTuple):
+    """A tagged element: its type, what it holds, and where the next one begins."""
+
+    kind: int
+    content: memoryview
+    end: int
 
 
 def matlab_table(path: Path) -> tuple[Float64Array, Float64Array]:
@@ -28,53 +51,86 @@ def matlab_table(path: Path) -> tuple[Float64Array, Float64Array]:
     ------
     SpectrumError
         If it is damaged, or does not hold these variables.
-    MissingExtraError
-        Without scipy.
     """
-    try:
-        import scipy.io
-    except ImportError:
-        raise MissingExtraError(
-            "MATLAB files need scipy", where=path, remedy="pip install scipy, or give a CSV"
-        ) from None
-    with path.open("rb") as stream:
-        if stream.read(len(_HDF5)) == _HDF5:
-            raise SpectrumError("is a MATLAB 7.3 file", where=path, remedy="save it with -v7, or as CSV")
     if path.stat().st_size > _LARGEST_BYTES:
         raise SpectrumError("is far too large for a table of spectra", where=path, remedy=_REMEDY)
+    content = path.read_bytes()
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:_HEADER])
+    if content[:10] == b"MATLAB 7.3":
+        raise SpectrumError("is a MATLAB 7.3 file", where=path, remedy="save it with -v7, or as CSV")
+    if order is None:
+        raise SpectrumError("is a damaged MATLAB file (no byte order)", where=path, remedy=_REMEDY)
     try:
-        # Names, shapes and types first: nothing is allocated for what is too large or no numbers.
-        listed = {name: (shape, kind) for name, shape, kind in scipy.io.whosmat(path)}
-        _check(listed, path)
-        found: dict[str, Any] = scipy.io.loadmat(path, variable_names=["data", "wavelength"])
-        wavelengths, data = found["wavelength"], found["data"]
-        return _oriented(np.asarray(wavelengths).ravel(), np.asarray(data), path)
-    except (SpectrumError, MissingExtraError):
-        raise
-    except Exception as error:  # scipy's reader raises what Python's own do
-        text = " ".join(str(error).split())[:120]
+        found = dict(_variables(memoryview(content), order))
+    except (struct.error, zlib.error, ValueError, IndexError) as error:
+        raise SpectrumError(f"is a damaged MATLAB file ({str(error)[:80]})", where=path, remedy=_REMEDY) from None
+    missing = [name for name in _WANTED if name not in found]
+    if missing:
+        raise SpectrumError(f"has no variable '{missing[0]}'", where=path, remedy=_REMEDY)
+    wavelengths, values = found["wavelength"].ravel(), found["data"]
+    if values.shape[0] != len(wavelengths):
         raise SpectrumError(
-            f"is a damaged MATLAB file ({text or type(error).__name__})", where=path, remedy=_REMEDY
-        ) from None
-
-
-def _check(listed: dict[str, tuple[tuple[int, ...], str]], path: Path) -> None:
-    for name in ("data", "wavelength"):
-        if name not in listed:
-            others = ", ".join(sorted(listed)[:6]) or "nothing"
-            raise SpectrumError(f"has no variable '{name}', only {others}", where=path, remedy=_REMEDY)
-        shape, kind = listed[name]
-        if kind not in _NUMBERS:
-            raise SpectrumError(f"'{name}' is of type {kind}", where=path, remedy=_REMEDY)
-        if len(shape) != 2 or not 0 < math.prod(shape) <= _MOST_NUMBERS:
-            raise SpectrumError(f"'{name}' has shape {' x '.join(map(str, shape))}", where=path, remedy=_REMEDY)
-
-
-def _oriented(wavelengths: Any, data: Any, path: Path) -> tuple[Float64Array, Float64Array]:
-    if np.iscomplexobj(wavelengths) or np.iscomplexobj(data):
-        raise SpectrumError("holds complex numbers", where=path, remedy=_REMEDY)
-    if data.ndim != 2 or data.shape[0] != len(wavelengths):
-        raise SpectrumError(
-            f"'data' has {data.shape[0]} rows for {len(wavelengths)} wavelengths", where=path, remedy=_REMEDY
+            f"'data' has {values.shape[0]} rows for {len(wavelengths)} wavelengths", where=path, remedy=_REMEDY
         )
-    return np.asarray(wavelengths, dtype=np.float64), np.asarray(data.T, dtype=np.float64)
+    return wavelengths, np.ascontiguousarray(values.T)
+
+
+def _variables(content: memoryview, order: str) -> Iterator[tuple[str, Float64Array]]:
+    """The wanted variables of a file; ValueError for whatever is wrong."""
+    at = _HEADER
+    for _ in range(_MOST_VARIABLES):
+        if at + 8 > len(content):
+            return
+        element = _element(content, at, order)
+        at = element.end
+        if element.kind == _COMPRESSED:
+            start = memoryview(zlib.decompressobj().decompress(element.content, _NAME_WITHIN))
+            if _name(start[8:], order) not in _WANTED:
+                continue
+            whole = memoryview(zlib.decompressobj().decompress(element.content, _LARGEST_BYTES))
+            element = _element(whole, 0, order)
+        if element.kind == _MATRIX and (name := _name(element.content, order)) in _WANTED:
+            yield name, _matrix(name, element.content, order)
+
+
+def _element(content: memoryview, at: int, order: str) -> _Element:
+    kind, size = struct.unpack_from(f"{order}II", content, at)
+    if kind >> 16:  # four bytes or fewer stand in the tag itself
+        kind, size, first, end = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+        if size > 4:
+            raise ValueError("an element of more than its tag")
+    else:
+        first = at + 8
+        end = first + size if kind == _COMPRESSED else first + size + -size % 8
+    if first + size > len(content):
+        raise ValueError("cut short")
+    return _Element(kind, content[first : first + size], end)
+
+
+def _parts(matrix: memoryview, order: str) -> tuple[_Element, _Element, _Element]:
+    """Flags, dimensions and name of a matrix."""
+    flags = _element(matrix, 0, order)
+    sizes = _element(matrix, flags.end, order)
+    return flags, sizes, _element(matrix, sizes.end, order)
+
+
+def _name(matrix: memoryview, order: str) -> str:
+    return bytes(_parts(matrix, order)[2].content).decode("latin-1")
+
+
+def _matrix(name: str, matrix: memoryview, order: str) -> Float64Array:
+    """A matrix of real numbers (rows, columns)."""
+    flags, sizes, named = _parts(matrix, order)
+    (flag,) = struct.unpack_from(f"{order}I", flags.content)
+    if flag & 0xFF not in _NUMBERS or flag & _COMPLEX:
+        raise ValueError(f"'{name}' holds no real numbers")
+    if len(sizes.content) != 8:
+        raise ValueError(f"'{name}' is no matrix")
+    shape = struct.unpack(f"{order}2i", sizes.content)
+    real = _element(matrix, named.end, order)
+    if real.kind not in _STORED or min(shape) < 1:
+        raise ValueError(f"'{name}' holds no numbers")
+    numbers = np.frombuffer(real.content, dtype=f"{order}{_STORED[real.kind]}")
+    if len(numbers) != math.prod(shape):
+        raise ValueError(f"'{name}' has {len(numbers)} numbers for {shape[0]} x {shape[1]}")
+    return np.asarray(numbers.reshape(shape, order="F"), dtype=np.float64)

@@ -499,9 +499,10 @@ def test_matlab_libraries(tmp_path: Path) -> None:
         assert found.names == ("1", "2", "3", "4")
     bad = {
         "no variable 'data'": {"wavelength": NM},
-        "of type char": {"data": "text", "wavelength": NM},
+        "no real numbers": {"data": "text", "wavelength": NM},
+        "is no matrix": {"data": np.ones((31, 2, 2)), "wavelength": NM},
         "has 30 rows": {"data": library.values.T[:30], "wavelength": NM},
-        "complex": {"data": library.values.T * 1j, "wavelength": NM},
+        "'data' holds no real": {"data": library.values.T * 1j, "wavelength": NM},
         "finite": {"data": library.values.T * np.nan, "wavelength": NM},
         "occurs twice": {"data": library.values.T, "wavelength": np.repeat(NM[:16], 2)[:31]},
         "reflectance up to": {"data": library.values.T * 100, "wavelength": NM},
