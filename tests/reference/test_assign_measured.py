@@ -27,7 +27,6 @@ JUDGES = [Light.builtin(name) for name in ("A", "FL2", "FL11", "LED-B3")]
 
 @pytest.fixture(scope="module")
 def library(measured_data: Path) -> Library:
-    pytest.importorskip("scipy.io")
     files = [measured_data / f"reflectances/{name}_Vhrel.mat" for name in ("Food", "Nature", "Objects")]
     return read_library(files)
 
