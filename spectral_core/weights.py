@@ -13,7 +13,7 @@ Interpolation is the cubic spline with not-a-knot ends. Measured against linear 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -23,6 +23,8 @@ from spectral_core.standards import DEFAULT_OBSERVER, observer_table
 
 # The spline's operator is dense, bands by bands: this many take a second and half a gigabyte.
 LARGEST_BANDS = 4000
+# Operators that are kept for the next light: 2 MB each.
+_LARGEST_KEPT = 512
 NOTABLE_EXTENSION = 1e-4
 # Even grids stay below 2, grids of 10 nm with each band up to 4 nm off its place below 2.6.
 NOTABLE_AMPLIFICATION = 3.0
@@ -253,6 +255,19 @@ def _hermite(knots: Float64Array, at: Float64Array) -> tuple[IntArray, Float64Ar
 
 
 def _spline_slope_operator(knots: Float64Array) -> Float64Array:
+    """Operator (n, n) from values to the slopes of the not-a-knot cubic spline; nobody may write to it."""
+    if len(knots) > _LARGEST_KEPT:
+        return _new_slope_operator(knots)
+    return _kept_slope_operator(knots.tobytes())
+
+
+@lru_cache(maxsize=8)
+def _kept_slope_operator(knots: bytes) -> Float64Array:
+    """All lights of a texture ask for the same one."""
+    return frozen(_new_slope_operator(np.frombuffer(knots)))
+
+
+def _new_slope_operator(knots: Float64Array) -> Float64Array:
     """Operator (n, n) from values to the slopes of the not-a-knot cubic spline.
 
     Continuity of the second derivative inside; continuity of the third at the second and the last

@@ -87,6 +87,8 @@ class PixelRule:
         """Whether a block (pixels, bands) holds nothing but numbers, seen from its projection (pixels, columns)."""
         if self.ignore_value is not None and bool((stored == self.ignore_value).any()):
             return False
+        if stored.dtype.kind in "iu":
+            return True
         # Whatever is no number spreads: into all sums of its pixel, and into the sum of these.
         with np.errstate(over="ignore", invalid="ignore"):
             return bool(np.isfinite(result.sum()))

@@ -32,7 +32,7 @@ _FLOAT_BYTES = 4
 @contextmanager
 def own_threads() -> Iterator[Product]:
     """The fastest product at hand, to be called from several threads at once while the block runs."""
-    sgemm = _scipy_sgemm() if int(np.__version__.split(".")[0]) < 2 else None
+    sgemm = _better_sgemm()
     if sgemm is None:
         yield _by_numpy
         return
@@ -47,13 +47,23 @@ def one_blas_thread() -> Iterator[None]:
     The OpenBLAS of NumPy 1.26 wakes them even to invert three by three numbers; then they spin for a tenth
     of a second, and take a processor from whatever comes next.
     """
+    controller = _libraries()
+    if controller is None:
+        yield
+        return
+    with controller.limit(limits=1, user_api="blas"):
+        yield
+
+
+@cache
+def _libraries() -> Any | None:
+    """The BLAS libraries of this process; looking for them takes a millisecond."""
     try:
         import threadpoolctl
     except ImportError:
-        yield
-        return
-    with threadpoolctl.threadpool_limits(1, user_api="blas"):
-        yield
+        return None
+    _better_sgemm()  # so that SciPy's is among them
+    return threadpoolctl.ThreadpoolController()
 
 
 def is_ready(pixels: Samples) -> bool:
@@ -82,6 +92,11 @@ def _by_numpy(pixels: Float32Array, factors: Float32Array, out: Float32Array) ->
         np.matmul(pixels[:whole].reshape(-1, rows, bands), factors, out=out[:whole].reshape(-1, rows, columns))
     if whole < len(pixels):
         np.matmul(pixels[whole:], factors, out=out[whole:])
+
+
+def _better_sgemm() -> Any | None:
+    """SciPy's, where NumPy brings an old one."""
+    return _scipy_sgemm() if int(np.__version__.split(".")[0]) < 2 else None
 
 
 @cache
