@@ -81,7 +81,8 @@ class PixelRule:
             bits = np.dtype(f"u{stored.dtype.itemsize}")
             return bool(stored.view(bits).max() <= _as_stored(highest, stored.dtype).view(bits))
         # NaN is the extreme of whatever holds it, and compares as false.
-        return bool(stored.min() >= lowest and stored.max() <= highest)
+        # As Python's floats: NumPy 2 would round the limit to the type of a half float.
+        return float(stored.min()) >= lowest and float(stored.max()) <= highest
 
     def is_whole(self, stored: Samples, result: Float32Array) -> bool:
         """Whether a block (pixels, bands) holds nothing but numbers, seen from its projection (pixels, columns)."""
