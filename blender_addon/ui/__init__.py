@@ -1,15 +1,17 @@
-"""The sidebar panel."""
+"""The sidebar's panels, and entries in Blender's own menus."""
 
 from __future__ import annotations
 
-from . import panel
+from . import menus, panel
 
 
 def register() -> None:
-    """Add the panel."""
+    """Add them."""
     panel.register()
+    menus.register()
 
 
 def unregister() -> None:
-    """Remove it."""
+    """Remove them, last first."""
+    menus.unregister()
     panel.unregister()

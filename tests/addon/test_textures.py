@@ -8,6 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
+import blender_addon
 from spectral_core.baking import bake_to_memory
 from spectral_core.lights import Light
 from spectral_core.textures import open_texture
@@ -32,6 +33,18 @@ def test_a_texture_becomes_one_image_per_light(capture: Path) -> None:
         pixels = np.empty(40 * 30 * 4, dtype=np.float32)
         image.pixels.foreach_get(pixels)
         np.testing.assert_array_equal(pixels.reshape(40, 30, 4)[::-1, :, :3], expected)
+
+
+def test_the_image_menu_offers_it() -> None:
+    """A menu's own list of what others added to it; once, and gone when the add-on is."""
+    added = [each.__module__ for each in bpy.types.IMAGE_MT_image._dyn_ui_initialize()]
+    assert added.count("blender_addon.ui.menus") == 1
+    blender_addon.unregister()
+    try:
+        added = [each.__module__ for each in bpy.types.IMAGE_MT_image._dyn_ui_initialize()]
+        assert "blender_addon.ui.menus" not in added
+    finally:
+        blender_addon.register()
 
 
 def test_counts_are_refused_in_one_line(capture: Path, tmp_path: Path) -> None:
