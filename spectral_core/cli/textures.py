@@ -139,7 +139,9 @@ def bake_command(
         [each["path"], each["light"], each["level"], each["clipped_fraction"], "kept" if each["kept"] else "made"]
         for each in document["outputs"]
     ]
-    emit(document, json, lambda console: console.print(table(("file", "light", "level", "share clipped", "state"), rows)))
+    emit(
+        document, json, lambda console: console.print(table(("file", "light", "level", "share clipped", "state"), rows))
+    )
 
 
 def _part(progress: Report, index: int, count: int) -> Report:

@@ -2,100 +2,35 @@
 
 from __future__ import annotations
 
-import io
-import json
-import random
-import struct
-import zipfile
-import zlib
-from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from assign_samples import (
+    BLUE,
+    D65,
+    FL11,
+    HALF,
+    NM,
+    Lab_at_random,
+    all_dE00,
+    all_rows,
+    noise,
+    smooth_library,
+    write_image,
+)
 
 from spectral_core import standards
-from spectral_core.assigning import Library, assign, held_out, read_library, spectra_source
+from spectral_core.assigning import Library, assign, spectra_source
 from spectral_core.assigning.bounds import Boxes, box_bounds, pair_lower_bound
 from spectral_core.assigning.change import smoothest_change
-from spectral_core.assigning.codes import between, code_colours
-from spectral_core.assigning.icc_codes import IccProfile
-from spectral_core.assigning.image import RgbImage
+from spectral_core.assigning.codes import between
 from spectral_core.assigning.nearest import nearest
-from spectral_core.display import load_profile, srgb
-from spectral_core.display.export import export_icc
-from spectral_core.display.export.icc import D50
-from spectral_core.errors import DisplayError, OutputError, SpectralBoothError, SpectrumError, TextureError
-from spectral_core.imaging import oiio
+from spectral_core.display import srgb
+from spectral_core.errors import SpectrumError
 from spectral_core.lights import Light
-from spectral_core.textures import open_texture
-
-Run = Callable[..., tuple[int, str, str]]
-NM = np.arange(400.0, 701.0, 10)
-D65, FL11 = Light.builtin("D65"), Light.builtin("FL11")
-# A half float rounds by at most 1 part in 2048; averaged over the bands that is far less than this dE00.
-HALF = 0.03
-BLUE = np.array([0.0, 5.0, -40.0])
-
-
-def smooth_library(count: int, seed: int = 0) -> Library:
-    """Reflectances like measured ones: a level, steps and bands, smooth, within 0.02 to 0.95."""
-    random_ = np.random.default_rng(seed)
-    level, step, edge, width, band, centre = (
-        random_.uniform(*limits, (count, 1))
-        for limits in ((-2.5, 2), (-4, 4), (420, 680), (8, 40), (-2.5, 2.5), (420, 680))
-    )
-    curve = level + step / (1 + np.exp(-(NM - edge) / width)) + band * np.exp(-(((NM - centre) / 45) ** 2))
-    values = 0.02 + 0.93 / (1 + np.exp(-curve))
-    return Library(tuple(f"r{i}" for i in range(count)), NM, values)
-
-
-def write_image(path: Path, codes: np.ndarray, **attributes: Any) -> Path:
-    """Write codes (height, width, channels), uint8 or uint16."""
-    spec = oiio().ImageSpec(
-        codes.shape[1], codes.shape[0], codes.shape[2], str(codes.dtype).replace("float32", "float")
-    )
-    for name, value in attributes.items():
-        spec.attribute(name, *value) if isinstance(value, tuple) else spec.attribute(name, value)
-    output = oiio().ImageOutput.create(str(path))
-    assert output.open(str(path), spec), output.geterror()
-    assert output.write_image(np.ascontiguousarray(codes))
-    output.close()
-    return path
-
-
-def write_library(path: Path, library: Library) -> Path:
-    rows = [",".join(map(repr, [float(nm), *row.tolist()])) for nm, row in zip(NM, library.values.T, strict=True)]
-    path.write_text("\n".join([",".join(["nm", *library.names]), *rows]) + "\n")
-    return path
-
-
-def noise(height: int, width: int, seed: int = 3, kind: str = "uint8") -> np.ndarray:
-    return np.random.default_rng(seed).integers(0, np.iinfo(kind).max, (height, width, 3), kind, endpoint=True)
-
-
-def all_rows(path: Path) -> tuple[np.ndarray, np.ndarray]:
-    """Wavelengths, and values (height, width, bands) in float64."""
-    texture: Any = open_texture(path)
-    values = texture.rows(0, texture.height).astype(np.float64)
-    if hasattr(texture, "close"):
-        texture.close()
-    assert texture.kind == "reflectance"
-    return texture.wavelengths_nm, values
-
-
-def Lab_at_random(count: int, chroma: float, seed: int) -> np.ndarray:
-    random_ = np.random.default_rng(seed)
-    return np.column_stack([random_.uniform(0, 100, count), random_.normal(0, chroma, (count, 2))])
-
-
-def all_dE00(colours: np.ndarray, library: np.ndarray) -> np.ndarray:
-    return standards.delta_E_2000(np.repeat(colours[:, None], len(library), axis=1), library[None])
-
-
-# --- the search
 
 
 @pytest.mark.parametrize("chroma", [4, 25, 60, 110])
@@ -154,9 +89,6 @@ def test_bounds_hold(spread: float) -> None:
         dE00 = standards.delta_E_2000(corner + share * side, second[::5])
         assert (least <= dE00**2 * (1 + 1e-9) + 1e-12).all()
         assert (most >= dE00**2 * (1 - 1e-9)).all()
-
-
-# --- nearest, mixed, changed
 
 
 def test_a_texture_of_library_colours_gets_its_spectra_back(tmp_path: Path) -> None:
@@ -307,9 +239,6 @@ def test_lamps_that_cannot_show_every_colour(lamp: str, how: dict[str, Any]) -> 
         assert (found.dE00 <= single.dE00 + 1e-9).all()
 
 
-# --- recovered
-
-
 @pytest.mark.parametrize("method", ["smits", "mallett", "otsu"])
 @pytest.mark.parametrize("lamp", ["D65", "FL11"])
 def test_recovered_reflectances_have_the_colours(tmp_path: Path, method: str, lamp: str) -> None:
@@ -357,383 +286,3 @@ def test_unknown_ways(tmp_path: Path) -> None:
             spectra_source(D65, library, **how)  # type: ignore[arg-type]
     with pytest.raises(SpectrumError, match="no library"):
         spectra_source(D65)
-
-
-# --- what codes mean
-
-
-@pytest.fixture
-def image(tmp_path: Path) -> RgbImage:
-    return RgbImage(write_image(tmp_path / "t.png", noise(8, 8)))
-
-
-def srgb_icc() -> bytes:
-    cms = pytest.importorskip("PIL.ImageCms")
-    return bytes(cms.ImageCmsProfile(cms.createProfile("sRGB")).tobytes())
-
-
-@pytest.mark.parametrize("lamp", ["D65", "A"])
-def test_an_icc_profile_means_what_the_display_profile_means(image: RgbImage, tmp_path: Path, lamp: str) -> None:
-    """Of two built-in displays, exported. LittleCMS gives 16-bit L*a*b*; ICC's own numbers have 16 bits too:
-    0.02 dE00 for colours, 0.2 in the dark, where black is a large share."""
-    pytest.importorskip("PIL")
-    white = Light.builtin(lamp).XYZ()
-    codes = np.random.default_rng(0).integers(0, 256, (500, 3)) / 255
-    for name in ("sRGB", "htc-vive-2021"):
-        by_icc = code_colours(image, white, icc=export_icc(load_profile(name), tmp_path / "p.icc"))
-        own = code_colours(image, white, profile=name)
-        dE00 = standards.dE00(by_icc.XYZ(codes), own.XYZ(codes), white)
-        assert np.median(dE00) < 0.02
-        assert dE00.max() < 0.2
-        np.testing.assert_allclose(own.XYZ(np.ones((1, 3)))[0], white, atol=1e-9)
-        np.testing.assert_allclose(by_icc.XYZ(np.ones((1, 3)))[0], white, atol=2e-4)
-        assert "display" in by_icc.profile
-
-
-def test_the_images_own_profile_is_used(tmp_path: Path) -> None:
-    """Of Pillow, version 2: embedded in PNG and TIFF it gives what sRGB gives, within its own rounding."""
-    icc, white = srgb_icc(), D65.XYZ()
-    codes = noise(6, 5)
-    for suffix in (".png", ".tif"):
-        profile = np.frombuffer(icc, dtype=np.uint8)
-        path = write_image(tmp_path / f"t{suffix}", codes, ICCProfile=(oiio().TypeDesc(f"uint8[{len(icc)}]"), profile))
-        picture = RgbImage(path)
-        assert picture.icc == icc
-        means = code_colours(picture, white)
-        assert "of the image itself" in means.profile
-        assert means.warnings == ()
-        expected = code_colours(picture, white, profile="sRGB")
-        assert "not used" in expected.warnings[0]
-        flat = codes.reshape(-1, 3) / 255
-        assert standards.dE00(means.XYZ(flat), expected.XYZ(flat), white).max() < 0.05
-
-
-def test_codes_of_16_bits_lie_between_those_of_8() -> None:
-    """Linear steps of 1/255 on a curve like gamma 2.2: 1e-5 of XYZ."""
-    profile = IccProfile(srgb_icc(), Path("s.icc"))
-    codes = np.random.default_rng(1).uniform(0, 1, (300, 3))
-    XYZ = srgb().to_XYZ(codes) @ between(srgb().to_XYZ(np.ones(3)), D50).T
-    Lab = standards.XYZ_to_Lab(XYZ, D50)
-    light = codes.min(axis=1) > 0.1  # the darkest steps are steep in L*a*b*
-    assert standards.delta_E_2000(profile.Lab(codes), Lab)[light].max() < 0.03
-
-
-def test_a_scanners_white_is_not_the_perfect_diffuser(image: RgbImage, tmp_path: Path) -> None:
-    """The same profile as a scanner's with a medium of 80 %: its white has Y = 0.8, and chroma is scaled with it."""
-    data = bytearray(srgb_icc())
-    data[12:16] = b"scnr"
-    count = struct.unpack(">I", data[128:132])[0]
-    tags = {
-        bytes(data[at : at + 4]): struct.unpack(">2I", data[at + 4 : at + 12])
-        for at in range(132, 132 + 12 * count, 12)
-    }
-    at = tags[b"wtpt"][0]
-    data[at + 8 : at + 20] = struct.pack(">3i", *np.round(D50 * 0.8 * 65536).astype(int).tolist())
-    profile = IccProfile(bytes(data), Path("s.icc"))
-    assert "input" in profile.name
-    Lab = profile.Lab(np.ones((1, 3)))[0]
-    assert Lab[0] == pytest.approx(116 * np.cbrt(0.8) - 16, abs=0.01)
-    np.testing.assert_allclose(Lab[1:], 0, atol=0.02)
-    path = tmp_path / "s.icc"
-    path.write_bytes(data)
-    assert "D50" in code_colours(image, FL11.XYZ(), icc=path).warnings[0]
-    assert code_colours(image, Light.builtin("D50").XYZ(), icc=path).warnings == ()
-
-
-def test_without_a_profile_srgb_is_taken_and_said(image: RgbImage) -> None:
-    means = code_colours(image, D65.XYZ())
-    assert means.profile == "sRGB"
-    assert "taken as sRGB" in means.warnings[0]
-
-
-def test_profiles_that_cannot_be_used(image: RgbImage, tmp_path: Path) -> None:
-    pytest.importorskip("PIL")
-    white = D65.XYZ()
-    data = srgb_icc()
-    for number, broken in enumerate((b"", b"no profile", data[:200], data[:16] + b"CMYK" + data[20:])):
-        path = tmp_path / f"{number}.icc"
-        path.write_bytes(broken)
-        with pytest.raises(DisplayError, match=f"{number}.icc"):
-            code_colours(image, white, icc=path)
-    with pytest.raises(DisplayError, match="no such file"):
-        code_colours(image, white, icc=tmp_path / "none.icc")
-    with pytest.raises(DisplayError, match="both"):
-        code_colours(image, white, icc=tmp_path / "0.icc", profile="sRGB")
-
-
-# --- libraries
-
-
-def test_libraries_are_put_together(tmp_path: Path) -> None:
-    first, second = smooth_library(5), smooth_library(7, seed=1)
-    one, two = write_library(tmp_path / "a.csv", first), write_library(tmp_path / "b.csv", second)
-    both = read_library([one, two, one])
-    assert both.names == tuple(f"a r{i}" for i in range(5)) + tuple(f"b r{i}" for i in range(7))
-    assert "5 reflectances are there twice" in both.warnings[0]
-    np.testing.assert_array_equal(both.values, np.concatenate([first.values, second.values]))
-    chart = read_library([one, "colorchecker"])
-    assert len(chart.names) == 29
-    assert "resampled to 31 wavelengths" in chart.warnings[0]
-    finer = read_library(["colorchecker"], step_nm=5)
-    np.testing.assert_array_equal(finer.wavelengths_nm, np.arange(380, 731, 5))
-    # A cubic spline at the library's own wavelengths is the library.
-    np.testing.assert_allclose(finer.values[:, ::2], read_library(["colorchecker"]).values, atol=1e-12)
-    beyond = read_library(["colorchecker", one])
-    assert "none beyond 400 to 700 nm" in beyond.warnings[-1]
-    for bad in (0.01, 400.0):
-        with pytest.raises(SpectrumError, match="impossible"):
-            read_library([one], step_nm=bad)
-    with pytest.raises(SpectrumError, match="no library"):
-        read_library([])
-
-
-def test_matlab_libraries(tmp_path: Path) -> None:
-    scipy_io = pytest.importorskip("scipy.io")
-    library = smooth_library(4)
-    for name, order in (("up", slice(None)), ("down", slice(None, None, -1))):
-        variables = {"data": library.values.T[order], "wavelength": NM[order][None], "comment": "made"}
-        scipy_io.savemat(tmp_path / f"{name}.mat", variables, do_compression=name == "up")
-        found = read_library([tmp_path / f"{name}.mat"])
-        np.testing.assert_array_equal(found.values, library.values)
-        np.testing.assert_array_equal(found.wavelengths_nm, NM)
-        assert found.names == ("1", "2", "3", "4")
-    bad = {
-        "no variable 'data' of numbers, only wavelength": {"wavelength": NM},
-        "no variable 'data' of numbers": {"data": "text", "wavelength": NM},
-        "has 30 rows": {"data": library.values.T[:30], "wavelength": NM},
-        "'data' of numbers": {"data": library.values.T * 1j, "wavelength": NM},
-        "finite": {"data": library.values.T * np.nan, "wavelength": NM},
-        "occurs twice": {"data": library.values.T, "wavelength": np.repeat(NM[:16], 2)[:31]},
-        "reflectance up to": {"data": library.values.T * 100, "wavelength": NM},
-        "micrometres": {"data": library.values.T, "wavelength": NM / 1000},
-    }
-    for message, variables in bad.items():
-        scipy_io.savemat(tmp_path / "bad.mat", variables)
-        with pytest.raises(SpectrumError, match=message):
-            read_library([tmp_path / "bad.mat"])
-    (tmp_path / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64" + bytes(600))
-    with pytest.raises(SpectrumError, match=r"new\.mat"):
-        read_library([tmp_path / "new.mat"])
-
-
-# --- what it is worth
-
-
-def test_held_out_leaves_itself_out() -> None:
-    """By hand: for each reflectance the nearest of the others under the scanner's lamp, compared under A."""
-    library, A = smooth_library(60), Light.builtin("A")
-    (found,) = held_out(spectra_source(FL11, library), library, FL11, [A])
-    distances = all_dE00(library.Lab(FL11), library.Lab(FL11))
-    np.fill_diagonal(distances, np.inf)
-    expected = standards.delta_E_2000(library.Lab(A), library.Lab(A)[distances.argmin(axis=1)])
-    assert found.dE00.mean == pytest.approx(expected.mean(), abs=1e-9)
-    assert found.dE00.max == pytest.approx(expected.max(), abs=1e-9)
-    assert found.colours == 60
-    same = held_out(spectra_source(FL11, library, 8, exact=True), library, FL11, [FL11, A])
-    assert same[0].dE00.mean < 0.2  # the colour itself is met, but for those that 0..1 keeps away
-    assert same[1].dE00.mean < found.dE00.mean / 3
-    with pytest.raises(SpectrumError, match="left out"):
-        held_out(spectra_source(FL11, smooth_library(1)), smooth_library(1), FL11, [A])
-
-
-def test_a_grey_rgb_texture_is_right_under_any_lamp() -> None:
-    """The yardstick itself: of constant reflectances an RGB texture predicts all colours, to rounding."""
-    grey = Library(("a", "b", "c"), NM, np.array([0.2, 0.5, 0.8])[:, None] * np.ones(len(NM)))
-    (found,) = held_out(spectra_source(D65, grey), grey, D65, [Light.builtin("A")])
-    assert found.rgb_texture.max < 1e-6
-
-
-# --- the command
-
-
-def test_the_command(run: Run, tmp_path: Path) -> None:
-    image = write_image(tmp_path / "t.png", noise(12, 10))
-    library = write_library(tmp_path / "l.csv", smooth_library(40))
-    code, out, err = run(
-        "assign", image, "--library", library, "--light", "FL11", "-o", tmp_path / "o.npz", "--judge", "A",
-        "--judge", "D65", "--json",
-    )  # fmt: skip
-    assert code == 0, err
-    document = json.loads(out)
-    assert {"mean", "p95", "max"} == set(document["dE00"])
-    assert 0 < document["reflectances_used"] <= document["library"] == 40
-    assert (document["pixels"], document["colours"], document["bands"]) == (120, 120, 31)
-    assert document["light"] == "FL11"
-    assert document["profile"] == "sRGB"
-    assert [each["light"] for each in document["held_out"]] == ["A", "D65"]
-    assert document["held_out"][0]["rgb_texture"]["mean"] > 0
-    assert "taken as sRGB" in err
-    code, out, _ = run("texture", "pixel", tmp_path / "o.npz", 3, 4, "--light", "FL11", "--json")
-    assert code == 0
-    assert len(json.loads(out)["reflectance"]) == 31
-    code, out, err = run("assign", image, "--library", "colorchecker", "--light", "D65", "-o", tmp_path / "p.exr",
-                         "--mix", 4, "--exact", "--step", 10, "--judge", "A")  # fmt: skip
-    assert code == 0, err
-    assert "left out" in out
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["--light", "D65"], "no library"),
-        (["--light", "D65", "--library", "none.csv"], "no such file"),
-        (["--light", "moon", "--library", "colorchecker"], "moon"),
-        (["--library", "colorchecker"], "--light"),
-        (["--light", "D65", "--library", "colorchecker", "--mix", "24"], "mix fewer"),
-        (["--light", "D65", "--recover", "smits", "--exact"], "neither mixed"),
-        (["--light", "D65", "--recover", "smits", "--judge", "A"], "--library with --judge"),
-        (["--light", "D65", "--library", "colorchecker", "--profile", "x.json"], "x.json"),
-        (["--light", "D65", "--library", "colorchecker", "--icc", "x.icc"], "x.icc"),
-        (["--light", "D65", "--library", "colorchecker", "--step", "nan"], "nan"),
-        (["--light", "D65", "--recover", "smits", "--step", "5"], "--step is for a library"),
-    ],
-)
-def test_bad_arguments(run: Run, tmp_path: Path, arguments: list[str], message: str) -> None:
-    image = write_image(tmp_path / "t.png", noise(4, 4))
-    code, out, err = run("assign", image, "-o", tmp_path / "o.npz", *arguments)
-    assert code == 2
-    assert out == ""
-    assert err.count("\n") == 1
-    assert message in err
-    assert not (tmp_path / "o.npz").exists()
-
-
-def test_output_that_cannot_be(tmp_path: Path) -> None:
-    image, library = write_image(tmp_path / "t.png", noise(4, 4)), smooth_library(3)
-    with pytest.raises(OutputError, match=r"'.tiff'"):
-        assign(image, D65, tmp_path / "o.tiff", library)
-    (tmp_path / "o.npz").mkdir()
-    with pytest.raises(OutputError, match="folder"):
-        assign(image, D65, tmp_path / "o.npz", library)
-
-
-def test_a_stopped_run_leaves_what_was_there(tmp_path: Path) -> None:
-    image, library = write_image(tmp_path / "t.png", noise(4, 4)), smooth_library(3)
-
-    def stop(_: float, __: str) -> None:
-        raise KeyboardInterrupt
-
-    for suffix in (".npz", ".npy", ".exr"):
-        (tmp_path / f"o{suffix}").write_text("old")
-        with pytest.raises(KeyboardInterrupt):
-            assign(image, D65, tmp_path / f"o{suffix}", library, progress=stop)
-        assert (tmp_path / f"o{suffix}").read_text() == "old"
-    assert sorted(each.name for each in tmp_path.iterdir()) == ["o.exr", "o.npy", "o.npz", "t.png"]
-
-
-# --- images
-
-
-@pytest.mark.parametrize("kind", ["uint8", "uint16"])
-@pytest.mark.parametrize("suffix", [".png", ".tif", ".bmp", ".tga"])
-def test_codes_come_as_they_are_stored(tmp_path: Path, suffix: str, kind: str) -> None:
-    if kind == "uint16" and suffix in (".bmp", ".tga"):
-        pytest.skip("formats of 8 bits")
-    codes = noise(37, 21, kind=kind)
-    for name, options in {"lines": {}, "tiles": {"tile_width": 16, "tile_height": 16}}.items():
-        spec = oiio().ImageSpec(21, 37, 3, kind)
-        if options and suffix != ".tif":
-            continue
-        for key, value in options.items():
-            setattr(spec, key, value)
-        path = tmp_path / f"{name}{suffix}"
-        output = oiio().ImageOutput.create(str(path))
-        assert output.open(str(path), spec)
-        assert output.write_image(codes)
-        output.close()
-        image = RgbImage(path)
-        assert (image.width, image.height, image.bits) == (21, 37, 8 if kind == "uint8" else 16)
-        found = np.concatenate([image.rows(first, min(5, 37 - first)) for first in range(0, 37, 5)])
-        np.testing.assert_array_equal(found, codes)
-
-
-def test_alpha_and_grey_are_said(tmp_path: Path) -> None:
-    codes = np.concatenate([noise(6, 6), np.full((6, 6, 1), 40, dtype=np.uint8)], axis=2)
-    image = RgbImage(write_image(tmp_path / "a.png", codes, **{"oiio:UnassociatedAlpha": 1}))
-    np.testing.assert_array_equal(image.rows(0, 6), codes[..., :3])  # not times alpha
-    assert "alpha" in image.warnings[0]
-    grey = RgbImage(write_image(tmp_path / "g.png", codes[..., :1]))
-    np.testing.assert_array_equal(grey.rows(1, 2), np.repeat(codes[1:3, :, :1], 3, axis=2))
-    assert "grey" in grey.warnings[0]
-    turned = RgbImage(write_image(tmp_path / "t.tif", codes[..., :3], Orientation=6))
-    assert "turned" in turned.warnings[0]
-
-
-def test_images_that_are_none(tmp_path: Path) -> None:
-    write_image(tmp_path / "float.tif", np.ones((3, 3, 3), dtype=np.float32))
-    write_image(tmp_path / "many.tif", np.ones((3, 3, 5), dtype=np.uint8))
-    write_image(tmp_path / "x.exr", np.ones((3, 3, 3), dtype=np.float32))
-    (tmp_path / "text.png").write_text("no image")
-    (tmp_path / "empty.png").write_bytes(b"")
-    for name in ("float.tif", "many.tif", "x.exr", "text.png", "empty.png", "none.png", "."):
-        with pytest.raises(TextureError, match=r"give|name"):
-            RgbImage(tmp_path / name)
-
-
-def test_a_header_that_promises_too_much(tmp_path: Path) -> None:
-    data = bytearray(write_image(tmp_path / "t.png", noise(4, 4)).read_bytes())
-    data[16:24] = struct.pack(">2I", 60_000, 60_000)
-    data[29:33] = struct.pack(">I", zlib.crc32(data[12:29]))
-    (tmp_path / "t.png").write_bytes(data)
-    with pytest.raises(TextureError, match=r"promises 60000 x 60000|no image"):
-        RgbImage(tmp_path / "t.png")
-
-
-def test_damaged_inputs_are_refused_or_read(run: Run, tmp_path: Path) -> None:
-    """Whatever the bytes of an image, a profile and a library: 0 and JSON, or 2 and one line. Seeded."""
-    pytest.importorskip("PIL")
-    random_ = random.Random(11)
-    image = write_image(tmp_path / "t.png", noise(9, 9))
-    tiff = write_image(tmp_path / "t.tif", noise(9, 9), compression="zip")
-    profile = tmp_path / "p.icc"
-    profile.write_bytes(srgb_icc())
-    library = write_library(tmp_path / "l.csv", smooth_library(4))
-    sources = [(image, "t.png"), (tiff, "t.tif"), (profile, "p.icc")]
-    try:
-        import scipy.io
-    except ImportError:
-        pass
-    else:
-        matlab = tmp_path / "l.mat"
-        scipy.io.savemat(matlab, {"data": smooth_library(4).values.T, "wavelength": NM})
-        sources.append((matlab, "l.mat"))
-    for source, name in sources:
-        good = source.read_bytes()
-        for _ in range(40):
-            damaged = bytearray(good)
-            for _ in range(random_.randint(1, 4)):
-                at = random_.randrange(min(len(damaged), random_.choice((64, 400, 4000))))
-                damaged[at : at + random_.choice((0, 1, 1, 4))] = random_.choice(
-                    (b"", b"\xff\xff\xff\xff", b"\0\0\0\0", b"\x7f\xff\xff\xff", random_.randbytes(3))
-                )
-            broken = tmp_path / f"broken{Path(name).suffix}"
-            broken.write_bytes(bytes(damaged))
-            arguments = {
-                "t.png": [broken, "--library", library], "t.tif": [broken, "--library", library],
-                "p.icc": [image, "--library", library, "--icc", broken], "l.mat": [image, "--library", broken],
-            }[name]  # fmt: skip
-            code, out, err = run("assign", *arguments, "--light", "D65", "-o", tmp_path / "o.npz", "--json")
-            what = f"{name} {bytes(damaged[:80])!r}: {err}"
-            assert code in (0, 2), what
-            if code == 0:
-                json.loads(out, parse_constant=lambda constant: pytest.fail(constant))
-            else:
-                assert out == "", what
-                assert err.startswith("error: "), what
-                assert err.count("\n") == 1, what
-                assert len(err) < 1000, what
-
-
-def test_a_written_archive_is_a_plain_one(tmp_path: Path) -> None:
-    image, library = write_image(tmp_path / "t.png", noise(4, 5)), smooth_library(3)
-    assign(image, D65, tmp_path / "o.npz", library)
-    with zipfile.ZipFile(tmp_path / "o.npz") as archive:
-        assert archive.testzip() is None
-    with np.load(io.BytesIO((tmp_path / "o.npz").read_bytes()), allow_pickle=False) as loaded:
-        assert loaded["reflectance"].shape == (4, 5, 31)
-        assert loaded["reflectance"].dtype == np.float16
-
-
-def test_every_error_is_one_of_ours(tmp_path: Path) -> None:
-    with pytest.raises(SpectralBoothError, match="no such file"):
-        assign(tmp_path / "none.png", D65, tmp_path / "o.npz", smooth_library(3))
