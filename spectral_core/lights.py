@@ -7,6 +7,7 @@ the width it stands for; a spectral line contributes one exact node.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -30,6 +31,8 @@ LARGEST_DUV = 0.05
 COARSEST_STEP_NM = 5.0
 # Powers are relative; beyond these their products overflow, or lose their digits.
 _POWER_RANGE = (1e-100, 1e100)
+# A share and a light of a mixture: "0.5 A".
+_PART = re.compile(r"\s*(?P<share>(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?)\s+(?P<name>\S.*)")
 _INDEX_GRID_NM = np.arange(380.0, 781.0)
 
 
@@ -56,9 +59,11 @@ class Light:
     lines
         (nodes,), True where a node is a spectral line, so that plots and indices know.
     kind
-        ``illuminant``, ``measured``, ``designed`` or ``file``.
+        ``illuminant``, ``measured``, ``designed``, ``file`` or ``mixture``.
     warnings
         What a user should know of it.
+    parts
+        Of a mixture: its lights and their shares of the white's luminance.
     """
 
     name: str
@@ -67,6 +72,7 @@ class Light:
     lines: BoolArray
     kind: str = "file"
     warnings: tuple[str, ...] = ()
+    parts: tuple[tuple[Light, float], ...] = ()
 
     @classmethod
     def from_table(cls, name: str, wavelengths_nm: Float64Array, powers: Float64Array, kind: str = "file") -> Light:
@@ -110,8 +116,7 @@ class Light:
         LightError
             If there is none of that name; the nearest names are suggested.
         """
-        known = {_key(each): each for each in builtin_names()}
-        known.update({alias: target for alias, target in _ALIASES.items() if alias not in known})
+        known = _names_by_key()
         if _key(name) not in known:
             near = difflib.get_close_matches(_key(name), list(known), n=3, cutoff=0.5)
             hint = f"did you mean {' or '.join(repr(known[each]) for each in near)}? " if near else ""
@@ -123,7 +128,7 @@ class Light:
 
     @classmethod
     def load(cls, name_or_path: str | Path) -> Light:
-        """A light from a built-in name or from a file with one spectrum.
+        """A light from a built-in name, a file with one spectrum, or a mixture (see `mixture_parts`).
 
         Raises
         ------
@@ -132,17 +137,27 @@ class Light:
         """
         text = str(name_or_path)
         path = Path(text)
+        parts = [] if is_file(path) else mixture_parts(text)
+        if parts:
+            return mixed_light([(cls.load(part), share) for part, share in parts])
         looks_like_file = path.suffix.lower() in (".csv", ".txt", ".tsv", ".spd") or "/" in text or "\\" in text
-        key = _key(text)
-        if key in _ALIASES or key in {_key(each) for each in builtin_names()}:
+        if _key(text) in _names_by_key():
             return cls.builtin(text)
         if not looks_like_file and not is_file(path):
             return cls.builtin(text)
         return light_from_spectra(read_spectra(path, "power"), path)
 
+    def same_spectrum(self, other: Light) -> bool:
+        """Whether it has the same nodes, whatever its name."""
+        return np.array_equal(self.wavelengths_nm, other.wavelengths_nm) and np.array_equal(self.powers, other.powers)
+
     def XYZ(self, observer: str = DEFAULT_OBSERVER) -> Float64Array:
         """XYZ (3,) with Y = 1."""
         return weights.light_XYZ(self.wavelengths_nm, self.powers, observer)
+
+    def luminance(self) -> float:
+        """The sum of its powers as the CIE 1931 observer weights them, in the unit of its powers."""
+        return float(self.powers @ weights.colour_matching(self.wavelengths_nm)[:, 1])
 
     def xy(self, observer: str = DEFAULT_OBSERVER) -> Float64Array:
         """Chromaticity (2,)."""
@@ -169,10 +184,17 @@ class Light:
         """
         nm = self.wavelengths_nm
         inside = (nm >= _INDEX_GRID_NM[0]) & (nm <= _INDEX_GRID_NM[-1])
-        if not self.lines.any() and _is_standard_grid(nm[inside]):
+        if not self.parts and not self.lines.any() and _is_standard_grid(nm[inside]):
             # Beyond 380 to 780 nm the table may be uneven: its density, not what its samples stand for.
             return nm[inside], (self.powers / weights.quadrature_widths(nm))[inside]
-        table = ~self.lines
+        return _INDEX_GRID_NM, self._every_nm()
+
+    def _every_nm(self) -> Float64Array:
+        """Powers at each nm from 380 to 780."""
+        if self.parts:
+            scaled = [light._every_nm() * (share / light.luminance()) for light, share in self.parts]
+            return np.asarray(np.sum(scaled, axis=0))
+        nm, table = self.wavelengths_nm, ~self.lines
         powers = np.zeros_like(_INDEX_GRID_NM)
         if table.sum() > 1:
             density = self.powers[table] / weights.quadrature_widths(nm[table])
@@ -182,7 +204,7 @@ class Light:
         for at, share in ((below, 1 - fraction), (below + 1, fraction)):
             inside = (at >= _INDEX_GRID_NM[0]) & (at <= _INDEX_GRID_NM[-1])
             np.add.at(powers, (at[inside] - _INDEX_GRID_NM[0]).astype(int), (self.powers[self.lines] * share)[inside])
-        return _INDEX_GRID_NM, powers
+        return powers
 
 
 def light_from_spectra(spectra: Spectra, path: Path) -> Light:
@@ -202,10 +224,74 @@ def light_from_spectra(spectra: Spectra, path: Path) -> Light:
         raise LightError(error.problem, where=path, remedy=error.remedy) from None
 
 
+def mixture_parts(text: str) -> list[tuple[str, float]]:
+    """Names and shares of a mixture such as ``0.5 A + 0.3 D65 + 0.2 FL11``; empty if the text is none.
+
+    Shares are of the white's luminance; they need not add up to 1, only their ratios count.
+    """
+    found = [_PART.fullmatch(part) for part in text.split(" + ")]
+    if len(found) < 2 or not all(found):
+        return []
+    return [(each["name"].strip(), float(each["share"])) for each in found if each]
+
+
+def mixture_name(parts: Sequence[tuple[str, float]]) -> str:
+    """The text of a mixture, or the one light's name."""
+    if len(parts) == 1:
+        return parts[0][0]
+    return " + ".join(f"{share:g} {name}" for name, share in parts)
+
+
+def check_shares(shares: Sequence[float]) -> float:
+    """The sum of a mixture's shares.
+
+    Raises
+    ------
+    LightError
+        If a share is negative or not finite, or all are 0.
+    """
+    total = sum(shares)
+    if not (np.isfinite(total) and total > 0 and min(shares) >= 0):
+        raise LightError(
+            f"the shares {', '.join(f'{each:g}' for each in shares)} make no mixture", remedy="give numbers above 0"
+        )
+    return total
+
+
+def mixed_light(parts: Sequence[tuple[Light, float]]) -> Light:
+    """Several lights as one, each with its share of the white's luminance; only the ratios count.
+
+    Raises
+    ------
+    LightError
+        As `check_shares`.
+    """
+    total = check_shares([share for _, share in parts])
+    nm = np.concatenate([light.wavelengths_nm for light, _ in parts])
+    powers = np.concatenate([light.powers * (share / total / light.luminance()) for light, share in parts])
+    order = np.argsort(nm, kind="stable")
+    return Light(
+        name=mixture_name([(light.name, share / total) for light, share in parts]),
+        wavelengths_nm=frozen(nm[order]),
+        powers=frozen(powers[order]),
+        lines=np.concatenate([light.lines for light, _ in parts])[order],
+        kind="mixture",
+        warnings=tuple(dict.fromkeys(text for light, _ in parts for text in light.warnings)),
+        parts=tuple((light, share / total) for light, share in parts),
+    )
+
+
 @cache
 def builtin_names() -> tuple[str, ...]:
     """Names of the built-in lights: CIE and ISO illuminants, measured sources, designed lights."""
     return (*standards.illuminant_tables(), *standards.light_source_tables(), *_DESIGNED)
+
+
+@cache
+def _names_by_key() -> dict[str, str]:
+    """Built-in names by what counts of a name, aliases included."""
+    known = {_key(each): each for each in builtin_names()}
+    return {**_ALIASES, **known}
 
 
 @cache

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 
 from spectral_core.chart import chart_objects, patch_surfaces
 from spectral_core.errors import LightError, SceneError, SpectrumError, TextureError
 from spectral_core.files import is_file
-from spectral_core.lights import Light
+from spectral_core.lights import Light, check_shares, mixed_light, mixture_parts
 from spectral_core.scene_reader import TableReader, Vector, parse_toml, read_toml
 from spectral_core.shapes import SHAPES
 from spectral_core.textures.base import KINDS
@@ -43,7 +43,10 @@ class RenderSettings:
 
 @dataclass(frozen=True)
 class Lamp:
-    """One lamp: a sun (directional) or a spot. `power` is relative; the white calibration scales all."""
+    """One lamp: a sun (directional) or a spot. `power` is relative; the white calibration scales all.
+
+    `light` is a light of its own; without one it has the scene's.
+    """
 
     name: str
     type: str
@@ -53,6 +56,7 @@ class Lamp:
     edge: float
     radius_m: float
     power: float
+    light: str = ""
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,8 @@ class SceneDescription:
         The light under which the RGB colours of levels 0 and 1 are known.
     lights
         What the scene offers; `verify` takes them all unless told.
+    adopted
+        Whether it tells of surfaces only: objects and lamps are a user's own, and there may be no white target.
     text, folder
         The TOML itself, and where relative file names start.
     """
@@ -118,6 +124,7 @@ class SceneDescription:
     lamps: tuple[Lamp, ...]
     surfaces: dict[str, SurfaceSource]
     objects: tuple[SceneObject, ...]
+    adopted: bool
     text: str
     folder: Path
 
@@ -156,7 +163,7 @@ def bundled_scene(name: str) -> Path:
 
 def parse_scene(text: str, folder: Path, name: str = "scene") -> SceneDescription:
     """A scene description from TOML text, as kept inside a .blend file."""
-    return _scene(parse_toml(text, Path(name)), text, folder / name)
+    return _scene(parse_toml(text, Path(name)), text, folder / name.replace("/", "-"))
 
 
 def _scene(reader: TableReader, text: str, path: Path) -> SceneDescription:
@@ -164,7 +171,8 @@ def _scene(reader: TableReader, text: str, path: Path) -> SceneDescription:
     if version != FORMAT:
         raise SceneError(f"'format' is {version}", where=path, remedy=f"this version reads format {FORMAT}")
     lights = reader.texts("lights")
-    objects = tuple(each for table in reader.tables("objects") for each in _objects(table))
+    adopted = reader.boolean("adopted", False)
+    objects = tuple(each for table in _tables(reader, "objects", adopted) for each in _objects(table))
     surfaces = {name: _surface(name, each) for name, each in reader.named_tables("surfaces").items()}
     for name, patch in patch_surfaces().items():
         if any(each.surface == name for each in objects):
@@ -176,18 +184,23 @@ def _scene(reader: TableReader, text: str, path: Path) -> SceneDescription:
         lights=tuple(_light(reader, "lights", each, path.parent) for each in lights),
         light=_light(reader, "light", reader.text("light", lights[0]), path.parent),
         level=reader.integer("level", 2, 0, 2),
-        white=_white(reader.table("white")),
+        white=_white(reader.table("white"), adopted),
         camera=_camera(reader.table("camera")),
         render=_render(reader.table("render", {})),
-        lamps=tuple(_lamp(each) for each in reader.tables("lamps")),
+        lamps=tuple(_lamp(each, path.parent) for each in _tables(reader, "lamps", adopted)),
         surfaces=surfaces,
         objects=objects,
+        adopted=adopted,
         text=text,
         folder=path.parent.resolve(),
     )
     reader.finish()
     _check_references(scene, path)
     return scene
+
+
+def _tables(reader: TableReader, key: str, optional: bool) -> list[TableReader]:
+    return reader.tables(key, []) if optional else reader.tables(key)
 
 
 def _light(reader: TableReader, key: str, name: str, folder: Path) -> str:
@@ -202,13 +215,34 @@ def _light(reader: TableReader, key: str, name: str, folder: Path) -> str:
 
 
 def resolve_light(name: str, folder: Path) -> Light:
-    """A light of a scene: built-in, or a file relative to the scene's folder."""
+    """A light of a scene: built-in, a file relative to the scene's folder, or a mixture of such."""
+    parts = light_parts(name, folder)
+    return parts[0][0] if len(parts) == 1 else mixed_light(parts)
+
+
+def light_parts(name: str, folder: Path) -> list[tuple[Light, float]]:
+    """The lights that a scene's light consists of, one unless it is a mixture, and their shares.
+
+    Raises
+    ------
+    LightError, SpectrumError
+        If one cannot be used, or the shares make no mixture.
+    """
+    found = [] if is_file(folder / name) else mixture_parts(name)
+    if found:
+        check_shares([share for _, share in found])
+    return [(resolve_light(part, folder), share) for part, share in found] or [(_single_light(name, folder), 1.0)]
+
+
+def _single_light(name: str, folder: Path) -> Light:
+    """A light is told from others by its name: that of a file is where it lies, for many columns are called `power`."""
     path = folder / name
-    return Light.load(path) if is_file(path) else Light.load(name)
+    return replace(Light.load(path), name=name) if is_file(path) else Light.load(name)
 
 
-def _white(table: TableReader) -> White:
-    white = White(table.text("object"), table.number("luminance", 0.85, 1e-3, 100))
+def _white(table: TableReader, adopted: bool) -> White:
+    target = table.text("object", "") if adopted else table.text("object")
+    white = White(target, table.number("luminance", 0.85, 1e-3, 100))
     table.finish()
     return white
 
@@ -239,7 +273,7 @@ def _render(table: TableReader) -> RenderSettings:
     return settings
 
 
-def _lamp(table: TableReader) -> Lamp:
+def _lamp(table: TableReader, folder: Path) -> Lamp:
     kind = table.text("type", "spot", ("spot", "sun"))
     spot = kind == "spot"
     lamp = Lamp(
@@ -251,6 +285,7 @@ def _lamp(table: TableReader) -> Lamp:
         table.number("edge", 0.3, 0, 1) if spot else 0.0,
         table.number("radius", 0.02, 0, 10) if spot else 0.0,
         table.number("power", 1.0, 1e-9, 1e9),
+        _light(table, "light", table.text("light"), folder) if table.has("light") else "",
     )
     table.finish()
     if lamp.location == lamp.target:
@@ -320,13 +355,13 @@ def _check_references(scene: SceneDescription, path: Path) -> None:
     for name in names:
         if names.count(name) > 1:
             raise refuse("name", f"'{name}' is used twice", "give each object and lamp its own")
-    if not scene.lamps:
+    if not scene.lamps and not scene.adopted:
         raise refuse("lamps", "is empty", "add a [[lamps]] table")
     for index, each in enumerate(scene.objects):
         if each.surface not in scene.surfaces:
             known = ", ".join(scene.surfaces) or "none"
             raise refuse(f"objects[{index}].surface", f"is '{each.surface}', which [surfaces] lacks", f"it has {known}")
-    if scene.white.object not in [each.name for each in scene.objects]:
+    if scene.white.object not in [each.name for each in scene.objects] and not scene.adopted:
         raise refuse("white.object", f"is '{scene.white.object}', which no object is called", "name the white target")
     if scene.light not in scene.lights:
         raise refuse("light", f"is '{scene.light}', which 'lights' lacks", "add it there")

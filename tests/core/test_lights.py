@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from spectral_core import light_design, standards
+from spectral_core import light_design, standards, weights
 from spectral_core.display import srgb, srgb_encode
 from spectral_core.errors import LightError
 from spectral_core.lights import Light, builtin_names
@@ -166,3 +166,75 @@ def test_missing_ends_and_coarse_tables_are_told() -> None:
     coarse = Light.from_table("coarse", np.arange(380.0, 781.0, 20), np.ones(21))
     assert any("5 nm" in each for each in coarse.warnings)
     assert not Light.builtin("D65").warnings
+
+
+MIXTURE = "0.5 A + 0.3 D65 + 0.2 FL11"
+SHARES = {"A": 0.5, "D65": 0.3, "FL11": 0.2}
+
+
+def test_a_mixture_has_its_lights_colour_by_their_shares_of_luminance() -> None:
+    mixture = Light.load(MIXTURE)
+    assert mixture.name == MIXTURE
+    assert {light.name: share for light, share in mixture.parts} == pytest.approx(SHARES)
+    XYZ = sum(share * Light.load(name).XYZ() for name, share in SHARES.items())
+    np.testing.assert_allclose(mixture.XYZ(), XYZ, rtol=1e-13)  # sums of hundreds of float64 numbers
+    for bands in (np.arange(400.0, 701.0, 10), np.arange(380.0, 781.0)):
+        factors = sum(share * Light.load(name).weighting_factors(bands).matrix for name, share in SHARES.items())
+        np.testing.assert_allclose(mixture.weighting_factors(bands).matrix, factors, atol=1e-13)
+
+
+def test_a_mixtures_indices_are_those_of_the_sum_of_tables() -> None:
+    """A, D65 and FL11 have tables every 5 nm, which are made one of 1 nm, linear in between, as the mixture's."""
+    nm = np.arange(380.0, 781.0)
+    total = np.zeros(len(nm))
+    for name, share in SHARES.items():
+        light = Light.load(name)
+        table = np.interp(nm, light.wavelengths_nm, light.powers / weights.quadrature_widths(light.wavelengths_nm))
+        total += share * table / light.luminance()
+    summed = Light.from_table("sum", nm, total).quality()
+    found = Light.load(MIXTURE).quality()
+    # Chromaticities differ: the sum of 1 nm tables is not that of the lights' own samples.
+    assert found.cct_K == pytest.approx(summed.cct_K, rel=2e-3)
+    assert found.duv == pytest.approx(summed.duv, abs=2e-4)
+    # The same table in, the same index out, but for the test's own interpolation beyond the ends.
+    assert found.rf == pytest.approx(summed.rf, abs=1e-6)
+    assert found.ra == pytest.approx(summed.ra, abs=1e-6)
+    assert found.rf != pytest.approx(Light.load("A").quality().rf, abs=1)
+
+
+def test_a_light_mixed_with_itself_is_itself() -> None:
+    twice, once = Light.load("1 LPS + 3 LPS"), Light.load("LPS")
+    np.testing.assert_allclose(twice.XYZ(), once.XYZ(), rtol=1e-14)
+    assert twice.lines.sum() == 2 * once.lines.sum()
+
+
+@pytest.mark.parametrize("file", [False, True])
+def test_only_ratios_of_shares_count(tmp_path: Path, file: bool) -> None:
+    name = "D65"
+    if file:
+        name = str(tmp_path / "lamp.csv")
+        light = Light.load("D65")
+        table = light.powers / weights.quadrature_widths(light.wavelengths_nm)
+        write_spectra(Path(name), light.wavelengths_nm, table[None], ("lamp",))
+    for text in (f"1 A + 3 {name}", f".25 A + 0.75 {name}", f"25. A + 75 {name}"):
+        np.testing.assert_allclose(Light.load(text).XYZ(), Light.load("0.25 A + 0.75 D65").XYZ(), rtol=1e-13)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("0 A + 0 D65", "the shares 0, 0 make no mixture; give numbers above 0"),
+        (f"{'9' * 400} A + 1 D65", "the shares inf, 1 make no mixture"),
+        ("0.5 A + 0.5 nope", "no built-in light and no file called 'nope'"),
+        ("0.5 A + D65", "no built-in light and no file called '0.5 A + D65'"),
+        ("-0.5 A + 1 D65", "no built-in light and no file called '-0.5 A + 1 D65'"),
+        ("0.5 A +", "no built-in light"),
+        ("0.5 A + 0.5 ", "no built-in light"),
+        ("0.5 A", "no built-in light"),
+    ],
+)
+def test_bad_mixtures_are_refused_in_one_line(text: str, message: str) -> None:
+    with pytest.raises(LightError) as caught:
+        Light.load(text)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
