@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from spectral_core.assigning import assign, read_library
     from spectral_core.baking import bake, bake_to_memory, level2_weights, project
+    from spectral_core.basis import SpectralBasis, choose_basis, fit_basis
     from spectral_core.display import DisplayProfile, load_profile
     from spectral_core.lights import Light
     from spectral_core.scene import load_scene
@@ -28,11 +29,14 @@ _HOME = {
     "Light": "lights",
     "Reading": "textures",
     "Spectra": "spectra",
+    "SpectralBasis": "basis",
     "WeightingFactors": "weights",
     "assign": "assigning",
     "bake": "baking",
     "bake_to_memory": "baking",
     "level2_weights": "baking",
+    "choose_basis": "basis",
+    "fit_basis": "basis",
     "load_profile": "display",
     "load_scene": "scene",
     "open_texture": "textures",
@@ -49,10 +53,13 @@ __all__ = [
     "Light",
     "Reading",
     "Spectra",
+    "SpectralBasis",
     "WeightingFactors",
     "assign",
     "bake",
     "bake_to_memory",
+    "choose_basis",
+    "fit_basis",
     "level2_weights",
     "load_profile",
     "load_scene",
