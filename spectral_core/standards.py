@@ -188,6 +188,14 @@ def fidelity_index(wavelengths_nm: Float64Array, powers: Float64Array) -> float:
     return _finite(value, "Rf")
 
 
+@cache
+def fidelity_samples() -> tuple[Float64Array, Float64Array]:
+    """Wavelengths (401,) in nm and reflectances (99, 401) of CIE 224:2017's test colour samples 1 to 99."""
+    colour = _colour()
+    samples = colour.quality.cfi2017.load_TCS_CIE2017(colour.SpectralShape(380, 780, 1))
+    return frozen(samples.wavelengths), frozen(samples.values.T)
+
+
 def rendering_index(wavelengths_nm: Float64Array, powers: Float64Array) -> float:
     """CIE 13.3-1995 general colour rendering index Ra of an evenly spaced SPD."""
     colour = _colour()

@@ -19,6 +19,7 @@ from spectral_core.display.export import (
     read_back_cube,
     read_back_icc,
     read_back_ocio,
+    read_back_ocio_xyz,
 )
 from spectral_core.errors import DisplayError
 
@@ -48,8 +49,10 @@ def export(
     display = load_profile(profile)
     if ocio is not None:
         made = export_ocio(display, ocio, base or blender_config())
-        chosen = {"display": made.display, "view": made.view}
-        document = _document(made.files, read_back_ocio(display, made)) | chosen
+        chosen = {"display": made.display, "view": made.view, "xyz_view": made.xyz_view}
+        xyz = read_back_ocio_xyz(display, made)
+        errors = {"xyz_max_code_error": xyz.max_code_error, "xyz_max_dE00": xyz.max_dE00}
+        document = _document(made.files, read_back_ocio(display, made), xyz) | chosen | errors
     elif cube is not None:
         written = export_cube(display, cube, cube_input)
         document = _document((written,), read_back_cube(display, written, cube_input)) | {"input": cube_input}
@@ -59,7 +62,8 @@ def export(
     emit(document, json, lambda console: console.print(facts(document)))
 
 
-def _document(files: tuple[Path, ...], read: ReadBack) -> Document:
+def _document(files: tuple[Path, ...], read: ReadBack, *others: ReadBack) -> Document:
+    """The figures of `read`, and what of all of them could not be read back."""
     error = read.max_code_error
     return {
         "files": [str(path) for path in files],
@@ -68,5 +72,7 @@ def _document(files: tuple[Path, ...], read: ReadBack) -> Document:
         "max_dE00": read.max_dE00,
         "read_back_by": read.by,
         "colours": read.colours,
-        "warnings": [f"not read back: {read.why}"] if read.by is None else [],
+        "warnings": [
+            f"not read back: {why}" for why in dict.fromkeys(each.why for each in (read, *others) if each.by is None)
+        ],
     }

@@ -13,6 +13,8 @@ import pytest
 from spectral_core import standards
 from spectral_core.display import DisplayProfile, load_profile, srgb_decode
 from spectral_core.display.export import (
+    XYZ_VIEW,
+    OcioExport,
     blender_config,
     export_cube,
     export_icc,
@@ -21,11 +23,13 @@ from spectral_core.display.export import (
     read_back_cube,
     read_back_icc,
     read_back_ocio,
+    read_back_ocio_xyz,
 )
 from spectral_core.display.export.icc import adaptation
 from spectral_core.display.measuring.state import HeadsetState
 from spectral_core.display.models.corrected import CorrectedLut
 from spectral_core.errors import DisplayError, OutputError
+from spectral_core.lights import Light
 
 Run = Callable[..., tuple[int, str, str]]
 _HEAD = """# A small config
@@ -130,32 +134,93 @@ def test_ocio_away_from_black(
     assert read.max_code_error < {"channel-lut": 5e-5, "grey-lut-corrected": 2e-3}.get(name, 2e-5)
 
 
+def test_ocio_takes_pixels_that_are_xyz(profile: DisplayProfile, base: Path, tmp_path: Path) -> None:
+    """As exact as the view of Rec.709 (see above); the plain display is sRGB's formula."""
+    exported = export_ocio(profile, tmp_path / "out", base)
+    for shown, display in ((profile, exported.display), (load_profile("sRGB"), "sRGB")):
+        read = read_back_ocio_xyz(shown, replace(exported, display=display))
+        assert read.by is not None, read.why
+        assert read.max_code_error is not None
+        assert read.max_dE00 is not None
+        resampled = isinstance(shown.model, CorrectedLut)
+        assert read.max_code_error < (0.05 if resampled else 2e-3)
+        assert read.max_dE00 < (0.5 if resampled else 0.003)
+        assert read.colours > 4000
+
+
+def test_xyz_keeps_colours_outside_rec709(base: Path, tmp_path: Path) -> None:
+    """Real surfaces under D65 that Blender's clamp of negative RGB changes; to 32-bit floats of the code, 2e-5."""
+    D65 = Light.builtin("D65")
+    names, chart_nm, chart = standards.colorchecker()
+    samples_nm, samples = standards.fidelity_samples()
+    assert samples.shape == (99, len(samples_nm))
+    cyan = chart[names.index("cyan")] @ D65.weighting_factors(chart_nm).matrix
+    green = samples[58 - 1] @ D65.weighting_factors(samples_nm).matrix
+    XYZ = 0.6 * np.stack([cyan, green])
+    assert (XYZ @ np.linalg.inv(standards.srgb_to_XYZ_matrix()).T).min(axis=1).max() < -0.01
+    profile = load_profile("htc-vive-2021")
+    codes = profile.to_codes(XYZ)
+    assert ((codes > 0.1) & (codes < 1)).all()
+    exported = export_ocio(profile, tmp_path / "out", base)
+    np.testing.assert_allclose(displayed(XYZ, exported, XYZ_VIEW), codes, atol=2e-5)
+
+
+def displayed(pixels: np.ndarray, exported: OcioExport, view: str) -> np.ndarray:
+    """Codes (n, 3) that OpenColorIO gives to scene-linear pixels (n, 3)."""
+    from spectral_core.imaging import oiio
+
+    image = oiio().ImageBuf(oiio().ImageSpec(len(pixels), 1, 3, oiio().FLOAT))
+    image.set_pixels(oiio().ROI(), np.float32(pixels[None]))
+    shown = oiio().ImageBufAlgo.ociodisplay(
+        image, exported.display, view, "scene_linear", colorconfig=str(exported.config)
+    )
+    assert not shown.has_error, shown.geterror()
+    return np.asarray(shown.get_pixels(oiio().FLOAT)).reshape(-1, 3)
+
+
+def test_both_displays_list_the_view_once(base: Path, tmp_path: Path) -> None:
+    """However often is exported; `Standard` stays the first."""
+    config = base
+    for name in ("one", "two", "one", "Spectral XYZ", "Spectral XYZ"):
+        exported = export_ocio(replace(load_profile("htc-vive-2020"), name=name), tmp_path / "out", config)
+        config = exported.config
+    text = config.read_text()
+    assert f"active_views: [Standard, Raw, {XYZ_VIEW}]" in text
+    assert 'active_displays: [sRGB, "two", "one", "Spectral XYZ (profile)"]' in text
+    for display in ("sRGB", "one", "two", "Spectral XYZ (profile)"):
+        assert text.count(f'{{name: {XYZ_VIEW}, colorspace: "{XYZ_VIEW}: {display}"}}') == 1
+        assert text.count(f'name: "{XYZ_VIEW}: {display}"') == 1
+    block = text[text.index("  sRGB:") : text.index("active_displays")]
+    assert block.index(XYZ_VIEW) < block.index('"two":')  # in sRGB's own list
+
+
+def test_a_config_that_lists_no_views_shows_all(tmp_path: Path) -> None:
+    base = write_base(tmp_path, SCENE_CONFIG.replace("active_views: [Standard, Raw]\n", ""))
+    profile = load_profile("htc-vive-2020")
+    exported = export_ocio(profile, tmp_path / "out", base)
+    assert "active_views" not in exported.config.read_text()
+    assert read_back_ocio_xyz(profile, exported).by is not None
+
+
 def test_ocio_keeps_what_the_config_had(base: Path, tmp_path: Path) -> None:
     exported = export_ocio(load_profile("htc-vive-2020"), tmp_path / "out", base)
     made = exported.config.read_text().splitlines()
     for line in base.read_text().splitlines():
-        assert line in made or line.startswith("active_displays")
+        assert line in made or line.startswith(("active_displays", "active_views"))
     assert 'active_displays: [sRGB, "htc-vive-2020"]' in made
-    assert (exported.display, exported.view) == ("htc-vive-2020", "Standard")
+    assert f"active_views: [Standard, Raw, {XYZ_VIEW}]" in made
+    assert (exported.display, exported.view, exported.xyz_view) == ("htc-vive-2020", "Standard", XYZ_VIEW)
     assert (tmp_path / "out/luts/scale.spimtx").read_text() == (base.parent / "luts/scale.spimtx").read_text()
 
 
 def test_ocio_clips(tmp_path: Path) -> None:
     """Below 0, above 1 and far beyond: in the range, channel by channel."""
-    from spectral_core.imaging import oiio
-
     profile = load_profile("htc-vive-2021")
     exported = export_ocio(profile, tmp_path / "out", write_base(tmp_path))
     XYZ = np.array([[-1.0, 0.5, 2.0], [0.0, 1.0, 0.0], [1e4, 1e4, 1e4], [0.5, 0.5, -0.2]])
-    image = oiio().ImageBuf(oiio().ImageSpec(len(XYZ), 1, 3, oiio().FLOAT))
     # Twice the XYZ of D65's scale is the config's scene-linear.
-    image.set_pixels(oiio().ROI(), np.float32(2 * XYZ[None]))
-    shown = oiio().ImageBufAlgo.ociodisplay(
-        image, exported.display, exported.view, "scene_linear", colorconfig=str(exported.config)
-    )
-    assert not shown.has_error, shown.geterror()
-    got = shown.get_pixels(oiio().FLOAT).reshape(-1, 3)
-    np.testing.assert_allclose(got, np.clip(profile.to_codes(XYZ), 0, 1), atol=1e-5)
+    for view, pixels in ((exported.view, 2 * XYZ), (exported.xyz_view, XYZ)):
+        np.testing.assert_allclose(displayed(pixels, exported, view), np.clip(profile.to_codes(XYZ), 0, 1), atol=1e-5)
 
 
 def test_both_eyes_in_one_config(tmp_path: Path, fitted: dict[str, DisplayProfile]) -> None:
@@ -233,6 +298,9 @@ def test_foreign_folders_stay_as_they_are(tmp_path: Path) -> None:
         (('"luts:filmic"', '"/etc:luts"'), "search_path"),
         (("colorspaces:\n", "spaces:\n"), "no section 'colorspaces'"),
         (("active_displays: [sRGB]\n", ""), "active_displays"),
+        (("  scene_linear: Linear\n", ""), "no role 'scene_linear'"),
+        (("  sRGB:\n", "  Monitor:\n"), "no display 'sRGB'"),
+        (("active_views: [Standard, Raw]", "active_views:\n  - Standard"), "active_views"),
     ],
 )
 def test_other_configs_are_refused(tmp_path: Path, change: tuple[str, str], message: str) -> None:
@@ -338,6 +406,9 @@ def test_command(run: Run, tmp_path: Path) -> None:
     assert document["max_code_error_8bit"] == pytest.approx(255 * document["max_code_error"])
     assert document["read_back_by"].startswith("OpenColorIO")
     assert (document["display"], document["view"], document["warnings"]) == ("htc-vive-2020", "Standard", [])
+    assert document["xyz_view"] == XYZ_VIEW
+    assert document["xyz_max_code_error"] < 2e-3
+    assert document["xyz_max_dE00"] < 0.003
     for option, name in (("--cube", "a.cube"), ("--icc", "a.icc")):
         code, text, _ = run("profile", "export", "htc-vive-2020", option, tmp_path / name, "--json")
         assert code == 0

@@ -2,11 +2,18 @@
 
 from spectral_core.display.export.cube import CubeInput, export_cube
 from spectral_core.display.export.icc import export_icc
-from spectral_core.display.export.names import export_name
+from spectral_core.display.export.names import XYZ_VIEW, export_name
 from spectral_core.display.export.ocio import OcioExport, blender_config, export_ocio
-from spectral_core.display.export.read_back import ReadBack, read_back_cube, read_back_icc, read_back_ocio
+from spectral_core.display.export.read_back import (
+    ReadBack,
+    read_back_cube,
+    read_back_icc,
+    read_back_ocio,
+    read_back_ocio_xyz,
+)
 
 __all__ = [
+    "XYZ_VIEW",
     "CubeInput",
     "OcioExport",
     "ReadBack",
@@ -18,4 +25,5 @@ __all__ = [
     "read_back_cube",
     "read_back_icc",
     "read_back_ocio",
+    "read_back_ocio_xyz",
 ]

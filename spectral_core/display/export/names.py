@@ -6,6 +6,9 @@ import re
 
 from spectral_core.display.profile import DisplayProfile
 
+# The view whose pixels are CIE XYZ (R = X, G = Y, B = Z; Y = 1 is the display's white) instead of Rec.709.
+XYZ_VIEW = "Spectral XYZ"
+
 
 def export_name(profile: DisplayProfile) -> str:
     """The profile's name, and its eye, in letters, digits, spaces and ``-_.()``; `display` if nothing is left."""

@@ -4,6 +4,10 @@ The new display's view ``Standard`` is colorimetric: what the scene's XYZ says i
 shows, and scene-linear Y = 1 is its white's luminance. The scene's white is not adapted to the
 headset's. Colours out of gamut are clipped channel by channel.
 
+The view `XYZ_VIEW` does the same with pixels that are XYZ themselves, written where scene-linear RGB is
+expected: Blender clamps negative RGB, so that colours outside Rec.709 never reach ``Standard``, while no
+light has a negative X, Y or Z. Blender's own display ``sRGB`` gets that view too.
+
 The config is text that is edited, not parsed: comments and everything of Blender's stay as they were.
 """
 
@@ -21,14 +25,17 @@ from pathlib import Path
 import numpy as np
 
 from spectral_core.arrays import Float64Array
+from spectral_core.display.builtin import srgb
 from spectral_core.display.export.luts import write_cube, write_spi1d
-from spectral_core.display.export.names import export_name
+from spectral_core.display.export.names import XYZ_VIEW, export_name
 from spectral_core.display.models.stages import SHAPER, Power, Stages, Tables, stages
 from spectral_core.display.profile import DisplayProfile
 from spectral_core.errors import DisplayError, OutputError
 from spectral_core.files import atomic_path, is_file, read_text
 
 VIEW = "Standard"
+# Blender's own display of an ordinary monitor.
+_PLAIN = "sRGB"
 _MARK = "# Made by Spectral Booth from"
 _REMEDY = "give Blender's own config.ocio (in its folder datafiles/colormanagement)"
 _SUFFIX = " (profile)"
@@ -47,6 +54,7 @@ class OcioExport:
     display: str
     view: str
     files: tuple[Path, ...]
+    xyz_view: str = XYZ_VIEW
 
 
 def blender_config() -> Path:
@@ -67,7 +75,8 @@ def blender_config() -> Path:
 
 
 def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport:
-    """Write a self-contained copy of the config `base` to `folder`, with the profile as one more display.
+    """Write a self-contained copy of the config `base` to `folder`, with the profile as one more display,
+    and with a view of XYZ for that display and for Blender's ``sRGB``.
 
     An earlier export under the same name is replaced; a name of Blender's own gets a suffix.
 
@@ -84,11 +93,12 @@ def export_ocio(profile: DisplayProfile, folder: Path, base: Path) -> OcioExport
     paths = _search_path(text, base)
     display = export_name(profile)
     text = _without(text, display)
-    while display.casefold() in _names(text):
+    while display.casefold() in _names(text) | {XYZ_VIEW.casefold()}:
         display += _SUFFIX
         text = _without(text, display)
     tables, transforms = _transforms(stages(profile.model), display)
     edited = _with_display(text, base, display, transforms)
+    edited = _with_plain_display(edited, base)
 
     own = folder / ("luts" if "luts" in paths else paths[0])
     files = [_table(own / name, values) for name, values in tables.items()]
@@ -219,25 +229,17 @@ def _file(name: str, interpolation: str) -> str:
 
 
 def _with_display(text: str, base: Path, display: str, transforms: list[str]) -> str:
-    """The config's text with a display of its own colour space, from the scene's reference space on."""
-    for role in ("reference", "cie_xyz_d65_interchange"):
+    """The config's text with a display of its own colour spaces, from the scene's reference space on."""
+    for role in ("reference", "cie_xyz_d65_interchange", "scene_linear"):
         if not re.search(rf"^  {role}:", text, re.MULTILINE):
             raise DisplayError(f"has no role '{role}'", where=base, remedy=_REMEDY)
-    views = [f"{{name: {VIEW}, colorspace: {_quoted(display)}}}", "{name: Raw, colorspace: Non-Color}"]
     begin, end = _bounds(display)
-    shown = [begin, f"  {_quoted(display)}:", *(f"    - !<View> {view}" for view in views), end]
+    views = [_view(VIEW, display), _view(XYZ_VIEW, _xyz_space(display)), _view("Raw", "Non-Color")]
+    shown = [begin, f"  {_quoted(display)}:", *views, end]
     space = [
         begin,
-        "  - !<ColorSpace>",
-        f"    name: {_quoted(display)}",
-        "    family: Display",
-        "    bitdepth: 32f",
-        "    description: Device codes of a measured display, colorimetric, clipped",
-        "    isdata: false",
-        "    from_scene_reference: !<GroupTransform>",
-        "      children:",
-        "        - !<ColorSpaceTransform> {src: reference, dst: cie_xyz_d65_interchange}",
-        *(f"        - {transform}" for transform in transforms),
+        *_space(display, "colorimetric", "cie_xyz_d65_interchange", transforms),
+        *_space(_xyz_space(display), "from pixels that are XYZ", "scene_linear", transforms),
         end,
     ]
     lines = _inserted(text.splitlines(), base, "displays", shown, at_end=True)
@@ -247,6 +249,62 @@ def _with_display(text: str, base: Path, display: str, transforms: list[str]) ->
     if count != 1:
         raise DisplayError("has no list active_displays", where=base, remedy=_REMEDY)
     return edited if edited.startswith(_MARK) else f"{_MARK} {base.name}, which says of itself:\n{edited}"
+
+
+def _with_plain_display(text: str, base: Path) -> str:
+    """The config's text with the view of XYZ for Blender's own display, and in the list of views to show."""
+    name = _xyz_space(_PLAIN)
+    begin, end = _bounds(name)
+    lines = _without(text, name).splitlines()
+    heads = [index for index, line in enumerate(lines) if line in (f"  {_PLAIN}:", f"  {_quoted(_PLAIN)}:")]
+    if not heads:
+        raise DisplayError(f"has no display '{_PLAIN}'", where=base, remedy=_REMEDY)
+    at = heads[0] + 1
+    while at < len(lines) and lines[at].startswith("    "):
+        at += 1
+    lines[at:at] = [begin, _view(XYZ_VIEW, name), end]
+    tables, transforms = _transforms(stages(srgb().model), _PLAIN)
+    assert not tables  # sRGB's curve is a formula
+    space = [begin, *_space(name, "from pixels that are XYZ", "scene_linear", transforms), end]
+    edited = "\n".join(_inserted(lines, base, "colorspaces", space, at_end=False)) + "\n"
+    return _with_active_view(edited, base)
+
+
+def _with_active_view(text: str, base: Path) -> str:
+    """The config's text with the view of XYZ among those that it shows; without a list it shows all."""
+    if not re.search("^active_views:", text, re.MULTILINE):
+        return text
+    listed = re.search(r"^active_views: \[(.+)\]$", text, re.MULTILINE)
+    if not listed:
+        raise DisplayError("has no views in its list active_views", where=base, remedy=_REMEDY)
+    if XYZ_VIEW in [view.strip(" \"'") for view in listed[1].split(",")]:
+        return text
+    return f"{text[: listed.end(1)]}, {XYZ_VIEW}{text[listed.end(1) :]}"
+
+
+def _xyz_space(display: str) -> str:
+    """The colour space of a display's view of XYZ; no display has a colon in its name (`export_name`)."""
+    return f"{XYZ_VIEW}: {display}"
+
+
+def _view(name: str, space: str) -> str:
+    return f"    - !<View> {{name: {name}, colorspace: {_quoted(space)}}}"
+
+
+def _space(name: str, what: str, pixels: str, transforms: list[str]) -> list[str]:
+    """A colour space of device codes; `pixels` is the space whose numbers the transforms take."""
+    return [
+        "  - !<ColorSpace>",
+        f"    name: {_quoted(name)}",
+        "    family: Display",
+        "    bitdepth: 32f",
+        f"    description: Device codes of a display, {what}, clipped",
+        "    isdata: false",
+        "    from_scene_reference: !<GroupTransform>",
+        "      children:",
+        f"        - !<ColorSpaceTransform> {{src: reference, dst: {pixels}}}",
+        *(f"        - {transform}" for transform in transforms),
+    ]
 
 
 def _quoted(name: str) -> str:

@@ -63,15 +63,24 @@ def probe_codes() -> Float64Array:
 def read_back_ocio(profile: DisplayProfile, export: OcioExport) -> ReadBack:
     """Ask OpenColorIO, inside OpenImageIO, for the codes that the display's view gives."""
     config = str(export.config)
+    XYZ = profile.to_XYZ(probe_codes())
 
     def ask(image: Any) -> Any:
         linear = oiio().ImageBufAlgo.colorconvert(image, _XYZ_D65, "scene_linear", colorconfig=config)
-        return linear if linear.has_error else oiio().ImageBufAlgo.ociodisplay(
-            linear, export.display, export.view, "scene_linear", colorconfig=config
-        )  # fmt: skip
+        return linear if linear.has_error else _displayed(linear, export, export.view)
 
-    XYZ = profile.to_XYZ(probe_codes())
     return _by_openimageio(profile, XYZ, XYZ, ask)
+
+
+def read_back_ocio_xyz(profile: DisplayProfile, export: OcioExport) -> ReadBack:
+    """Ask OpenColorIO for the codes that the display's view of XYZ gives to pixels that are XYZ."""
+    XYZ = profile.to_XYZ(probe_codes())
+    return _by_openimageio(profile, XYZ, XYZ, lambda image: _displayed(image, export, export.xyz_view))
+
+
+def _displayed(pixels: Any, export: OcioExport, view: str) -> Any:
+    config = str(export.config)
+    return oiio().ImageBufAlgo.ociodisplay(pixels, export.display, view, "scene_linear", colorconfig=config)
 
 
 def read_back_cube(profile: DisplayProfile, path: Path, read_as: CubeInput) -> ReadBack:
