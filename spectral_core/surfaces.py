@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache, lru_cache
 from importlib import resources
 from pathlib import Path
@@ -79,9 +79,18 @@ class Surface:
         return light.weighting_factors(grid).extended
 
 
+@dataclass(frozen=True)
+class _Described:
+    """The surfaces of a description: its text says all of them, so that not each need be compared."""
+
+    text: str
+    folder: Path
+    sources: dict[str, SurfaceSource] = field(compare=False)
+
+
 @lru_cache(maxsize=8)
-def _surfaces(text: str, folder: Path, sources: tuple[SurfaceSource, ...]) -> dict[str, Surface]:
-    return {source.name: resolve_surface(source, folder) for source in sources}
+def _surfaces(described: _Described) -> dict[str, Surface]:
+    return {name: resolve_surface(source, described.folder) for name, source in described.sources.items()}
 
 
 def scene_surfaces(scene: SceneDescription) -> dict[str, Surface]:
@@ -92,7 +101,7 @@ def scene_surfaces(scene: SceneDescription) -> dict[str, Surface]:
     SceneError, SpectrumError, TextureError
         If one cannot be resolved.
     """
-    return _surfaces(scene.text, scene.folder, tuple(scene.surfaces.values()))
+    return _surfaces(_Described(scene.text, scene.folder, scene.surfaces))
 
 
 def resolve_surface(source: SurfaceSource, folder: Path) -> Surface:
