@@ -7,8 +7,6 @@ runtime then yields the codes. The steps are those of `spectral_core.display.mod
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import bpy
 import numpy as np
 
@@ -17,23 +15,22 @@ from spectral_core.display.models.corrected import TOE, TOE_SLOPE
 from spectral_core.display.models.stages import SHAPER, SRGB, Interaction, Power, Stages, Tables, stages
 from spectral_core.display.profile import DisplayProfile
 
+from .images import empty_image, write_image
+from .node_builder import Builder, Socket, new_group
+
 GROUP_KEY = "spectral_booth_display"
 # Nodes a side of a 3-D table: in a picture of 65 x 4225 texels, 4.4 MB.
 TABLE_NODES = 65
 # A square of texels to look the curves up in: between two of 65536 codes differ by 2e-5.
 _CURVE_SIDE = 256
 
-Socket = bpy.types.NodeSocket
-
 
 def display_group(profile: DisplayProfile, name: str) -> bpy.types.NodeTree:
     """A node group for a profile: ``XYZ`` (white Y = 1) to ``Emission``; codes are clipped to 0..1."""
-    tree = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    tree = new_group(name, {"XYZ": "Vector"}, {"Emission": "Color"})
     tree[GROUP_KEY] = profile.name
-    tree.interface.new_socket("XYZ", in_out="INPUT", socket_type="NodeSocketVector")
-    tree.interface.new_socket("Emission", in_out="OUTPUT", socket_type="NodeSocketColor")
     build = Builder(tree)
-    codes = _codes(build, build.input, stages(profile.model), name)
+    codes = _codes(build, build.inputs["XYZ"], stages(profile.model), name)
     build.finish(build.combine([_srgb_decode(build, code) for code in codes]))
     return tree
 
@@ -45,105 +42,6 @@ def remove_group(tree: bpy.types.NodeTree) -> None:
     for image in images:
         if not image.users:
             bpy.data.images.remove(image)
-
-
-class Builder:
-    """Adds nodes to a tree, left to right."""
-
-    def __init__(self, tree: bpy.types.NodeTree) -> None:
-        self._tree = tree
-        self._column = 0
-        entry = self._node("NodeGroupInput")
-        self.input: Socket = entry.outputs[0]
-
-    def math(self, operation: str, *values: Socket | float) -> Socket:
-        """One number of a Math node."""
-        node = self._node("ShaderNodeMath")
-        node.operation = operation
-        for socket, value in zip(node.inputs, values, strict=False):
-            self._put(socket, value)
-        return node.outputs[0]
-
-    def dot(self, vector: Socket, weights: Sequence[float]) -> Socket:
-        """The product with three numbers."""
-        node = self._node("ShaderNodeVectorMath")
-        node.operation = "DOT_PRODUCT"
-        self._put(node.inputs[0], vector)
-        node.inputs[1].default_value = [float(each) for each in weights]
-        return node.outputs["Value"]
-
-    def combine(self, values: Sequence[Socket | float]) -> Socket:
-        """Three numbers as a vector."""
-        node = self._node("ShaderNodeCombineXYZ")
-        for socket, value in zip(node.inputs, values, strict=True):
-            self._put(socket, value)
-        return node.outputs[0]
-
-    def separate(self, vector: Socket) -> list[Socket]:
-        """A vector as three numbers."""
-        node = self._node("ShaderNodeSeparateXYZ")
-        self._put(node.inputs[0], vector)
-        return list(node.outputs)
-
-    def texel(self, image: bpy.types.Image, column: Socket, row: Socket) -> list[Socket]:
-        """The three numbers of a texel.
-
-        Between texels the shader mixes itself: Blender's own filter takes from smaller copies of the
-        image wherever neighbouring pixels look up distant places.
-        """
-        width, height = image.size
-        place = self.combine(
-            [self.math("MULTIPLY_ADD", column, 1 / width, 0.5 / width),
-             self.math("MULTIPLY_ADD", row, 1 / height, 0.5 / height), 0.0]
-        )  # fmt: skip
-        node = self._node("ShaderNodeTexImage")
-        node.image, node.interpolation, node.extension = image, "Closest", "EXTEND"
-        self._put(node.inputs[0], place)
-        return self.separate(node.outputs["Color"])
-
-    def mix(self, share: Socket, low: Sequence[Socket], high: Sequence[Socket]) -> list[Socket]:
-        """Numbers between `low` and `high`."""
-        return [
-            self.math("MULTIPLY_ADD", share, self.math("SUBTRACT", after, before), before)
-            for before, after in zip(low, high, strict=True)
-        ]
-
-    def group(self, tree: bpy.types.NodeTree, value: Socket) -> Socket:
-        """The result of another group for one value."""
-        node = self._node("ShaderNodeGroup")
-        node.node_tree = tree
-        self._put(node.inputs[0], value)
-        return node.outputs[0]
-
-    def attribute(self, name: str) -> Socket:
-        """A number among the scene's custom properties."""
-        node = self._node("ShaderNodeAttribute")
-        node.attribute_type, node.attribute_name = "VIEW_LAYER", name
-        return node.outputs["Fac"]
-
-    def clamp(self, value: Socket) -> Socket:
-        """A number within 0..1."""
-        return self.math("MINIMUM", self.math("MAXIMUM", value, 0.0), 1.0)
-
-    def choose(self, condition: Socket, yes: Socket, no: Socket) -> Socket:
-        """`yes` where the condition is 1, `no` where it is 0."""
-        return self.math("MULTIPLY_ADD", condition, self.math("SUBTRACT", yes, no), no)
-
-    def finish(self, result: Socket) -> None:
-        """Put the result out."""
-        self._put(self._node("NodeGroupOutput").inputs[0], result)
-
-    def _node(self, kind: str) -> bpy.types.Node:
-        node = self._tree.nodes.new(kind)
-        node.location = (180 * (self._column // 4), -160 * (self._column % 4))
-        self._column += 1
-        return node
-
-    def _put(self, socket: Socket, value: Socket | float) -> None:
-        if isinstance(value, bpy.types.NodeSocket):
-            self._tree.links.new(value, socket)
-        else:
-            socket.default_value = float(value)
 
 
 def _codes(build: Builder, XYZ: Socket, steps: Stages, name: str) -> list[Socket]:
@@ -224,11 +122,6 @@ def _srgb_encode(build: Builder, linear: Socket) -> Socket:
 def _image(name: str, rows: Float64Array) -> bpy.types.Image:
     """A table (height, width, 3) as an image in full floats, row 0 at the bottom (v = 0)."""
     height, width, _ = rows.shape
-    image = bpy.data.images.new(name, width, height, float_buffer=True, is_data=True, alpha=True)
-    image.use_half_precision, image.alpha_mode = False, "CHANNEL_PACKED"
-    rgba = np.ones((height, width, 4), dtype=np.float32)
-    rgba[..., :3] = rows
-    image.pixels.foreach_set(rgba.ravel())
-    image.update()
-    image.pack()
+    image = empty_image(name, width, height)
+    write_image(image, rows[::-1].astype(np.float32))
     return image
