@@ -46,7 +46,7 @@ class PatchReading:
     irradiance
         Relative to that which gives the perfect diffuser its luminance.
     stored
-        (3,) linear RGB the material holds, in the precision it is stored in.
+        (3,) linear RGB at irradiance 1 that follows from what material and lamps hold, in their precision.
     exact
         (3,) linear RGB of theory at irradiance 1, float64, from the spectra.
     """
@@ -125,7 +125,7 @@ def compare(
     # The shape is said because a view of textures alone has no readings.
     rendered = np.array([reading.rendered for reading in readings]).reshape(-1, 3)
     exact = np.array([reading.exact for reading in readings]).reshape(-1, 3) * irradiance
-    stored = np.array([reading.stored for reading in readings]).reshape(-1, 3) * irradiance * lighting.lamp_rgb
+    stored = np.array([reading.stored for reading in readings]).reshape(-1, 3) * irradiance
     inside = in_gamut(exact)
     difference = np.abs(_codes(rendered) - _codes(exact))
     dE00 = _dE00(rendered, exact, lighting)

@@ -15,13 +15,8 @@ from spectral_core.scene import Camera, Lamp, RenderSettings, SceneDescription, 
 from spectral_core.shapes import Mesh, build_mesh
 from spectral_core.surfaces import scene_surfaces
 
-from . import lighting, state
+from . import lighting, state, ways
 from .materials import make_material
-
-# Blender's spot: radiant intensity energy / (4 pi^2) per unit; this makes power 1 about one
-# lux-like unit of irradiance at one metre before the white is calibrated.
-_SPOT_ENERGY = 4 * math.pi**2
-_SUN_ENERGY = math.pi
 
 
 @dataclass(frozen=True)
@@ -61,7 +56,7 @@ def build_scene(scene: bpy.types.Scene, description: SceneDescription) -> Built:
     scene.camera = _add_camera(scene, description.camera)
     set_black_world(scene)
     _set_render(scene, description.render)
-    lighting.apply(scene, description.light, description.level)
+    ways.rebuild(scene)
     return Built(len(description.objects), len(materials), len(description.lamps))
 
 
@@ -121,16 +116,17 @@ def _add_lamp(scene: bpy.types.Scene, lamp: Lamp) -> None:
     data = bpy.data.lights.new(lamp.name, "SUN" if lamp.type == "sun" else "SPOT")
     if lamp.type == "sun":
         data.angle = 0.0
-        data.energy = _SUN_ENERGY * lamp.power
     else:
-        data.energy = _SPOT_ENERGY * lamp.power
         data.spot_size = math.radians(lamp.cone_deg)
         data.spot_blend = lamp.edge
         data.shadow_soft_size = lamp.radius_m
+    data.energy = state.unit_energy(data) * lamp.power
     made = bpy.data.objects.new(lamp.name, data)
     made.location = lamp.location
     made.rotation_euler = _aim(lamp.location, lamp.target)
     made[state.LAMP_KEY] = lamp.power
+    if lamp.light:
+        made[state.LAMP_LIGHT_KEY] = lamp.light
     scene.collection.objects.link(made)
 
 

@@ -12,12 +12,14 @@ import bpy
 import numpy as np
 
 from spectral_core.arrays import Float32Array
+from spectral_core.display.export import XYZ_VIEW
 from spectral_core.display.judging.shown import ShownLight, ShownPatch, compare_shown
 from spectral_core.display.profile import DisplayProfile
 from spectral_core.errors import BlenderError
 from spectral_core.scene import resolve_light
+from spectral_core.standards import srgb_to_XYZ_matrix
 
-from . import lighting, state, verify
+from . import state, verify, ways
 from .render import render_linear, save_shown
 
 Progress = Callable[[float, str], None]
@@ -25,10 +27,11 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class Display:
-    """A display and view of the OpenColorIO config that Blender was started with."""
+    """A display of the OpenColorIO config that Blender was started with, and its views of linear Rec.709 and of XYZ."""
 
     name: str
     view: str
+    xyz_view: str = XYZ_VIEW
 
 
 def config_path() -> Path:
@@ -38,8 +41,10 @@ def config_path() -> Path:
 
 
 @contextmanager
-def shown_on(scene: bpy.types.Scene, display: Display) -> Iterator[None]:
+def shown_on(scene: bpy.types.Scene, display: Display, in_XYZ: bool = False) -> Iterator[None]:
     """The scene through a display and nothing else: no look, exposure, curves or dither; restored afterwards.
+
+    Its pixels are linear Rec.709 unless they are `in_XYZ`.
 
     Raises
     ------
@@ -49,12 +54,13 @@ def shown_on(scene: bpy.types.Scene, display: Display) -> Iterator[None]:
     device, view, render = scene.display_settings, scene.view_settings, scene.render
     kept = (device.display_device, view.view_transform, view.look, view.exposure, view.gamma, view.use_curve_mapping)
     dither = render.dither_intensity
+    chosen = display.xyz_view if in_XYZ else display.view
     try:
         try:
-            device.display_device, view.view_transform = display.name, display.view
+            device.display_device, view.view_transform = display.name, chosen
         except TypeError:
             raise BlenderError(
-                f"Blender's colour management has no display '{display.name}' with a view '{display.view}'",
+                f"Blender's colour management has no display '{display.name}' with a view '{chosen}'",
                 remedy="export the profile with --ocio and start Blender with the variable OCIO set to its config",
             ) from None
         view.look, view.exposure, view.gamma, view.use_curve_mapping = "None", 0.0, 1.0, False
@@ -73,26 +79,32 @@ def verify_display(
     display: Display,
     progress: Progress,
 ) -> list[ShownLight]:
-    """Codes of the scene's patches through `display`, against the profile's own, per light at level 2."""
-    description = state.description(scene)
+    """Codes of the scene's patches through `display`, against the profile's own, per light at level 2.
+
+    With coded lamps surfaces emit XYZ, whatever the scene's target, and the display's view of XYZ is used.
+    """
+    description, in_XYZ = state.description(scene), scene.spectral_booth.way == "CODED"
+    to_pixels = srgb_to_XYZ_matrix() if in_XYZ else np.eye(3)
     for light in lights:
         resolve_light(light, description.folder)  # refuse a wrong name before the first render
+    ways.learn(scene, lights)
     progress(0.0, "what the camera sees")
     results = []
-    with verify.as_found(scene), shown_on(scene, display):
+    with verify.as_found(scene), shown_on(scene, display, in_XYZ):
         view = verify.survey(scene)
         for index, light in enumerate(lights):
             progress((index + 0.5) / (len(lights) + 0.5), f"{light} through {display.name}")
-            applied = lighting.apply(scene, light, 2)
-            linear = render_linear(scene).pixels
-            readings = verify.read_patches(scene, applied.lighting, linear, view)
+            applied = ways.light(scene, light, 2, only=True)
+            rendered = render_linear(scene).pixels
+            readings = verify.read_patches(scene, applied, rendered, view)
             codes = _codes(scene)
             patches = []
             for reading in readings:
                 mask = view.identity.masks[reading.name]
-                pixels = linear[mask].astype(np.float64), codes[mask].astype(np.float64)
-                patches.append(ShownPatch(reading.name, *pixels, reading.exact * reading.irradiance))
-            results.append(compare_shown(light, patches, profile))
+                pixels = rendered[mask].astype(np.float64), codes[mask].astype(np.float64)
+                exact = to_pixels @ reading.exact * reading.irradiance
+                patches.append(ShownPatch(reading.name, *pixels, exact))
+            results.append(compare_shown(light, patches, profile, in_XYZ))
     return results
 
 

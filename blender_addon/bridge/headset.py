@@ -1,18 +1,16 @@
-"""Show a managed scene through a display's profile in the materials themselves, each eye through its own.
+"""The profiles of a headset's eyes as a node group: what leaves a surface to what it must emit.
 
 In a headset Blender ignores colour management, so every managed material turns the light that
-leaves it into device codes after lighting: its shader's colour goes through the node group of
-`display_nodes`. Which eye is being drawn is told to the shaders by a property of the scene: after each
-eye a draw handler sets it for the next one.
+leaves it into device codes after lighting. Which eye is being drawn is told to the shaders by a property
+of the scene: after each eye a draw handler sets it for the next one.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import bpy
+import numpy as np
 
 from spectral_core.display import DisplayProfile, load_profile
 from spectral_core.display.limits.luminance import eye_scene_whites, scene_white
@@ -20,10 +18,8 @@ from spectral_core.errors import BlenderError
 from spectral_core.standards import srgb_to_XYZ_matrix
 
 from ..eyes import EYE_PROPERTY
-from . import display_nodes, state
-
-GROUP = "Spectral Headset"
-_NODES = ("Spectral Lit", "Spectral Display", "Spectral Emission")
+from . import display_nodes
+from .node_builder import Builder, new_group
 
 
 @dataclass(frozen=True)
@@ -46,8 +42,8 @@ class Shown:
         return notes
 
 
-def apply(scene: bpy.types.Scene, left: str, right: str = "") -> Shown:
-    """Show a managed scene through a profile (built-in name or file), or through one per eye.
+def load(left: str, right: str = "") -> Shown:
+    """A profile for both eyes (built-in name or file), or one for each.
 
     Raises
     ------
@@ -58,90 +54,17 @@ def apply(scene: bpy.types.Scene, left: str, right: str = "") -> Shown:
     if not eyes:
         raise BlenderError("no profile was given", remedy="name a profile's JSON or a built-in one")
     whites = eye_scene_whites(*eyes) if len(eyes) == 2 else (scene_white(eyes[0]),)
-    shown = Shown(eyes, whites)
-    if not state.managed_materials(scene):
-        raise BlenderError(f"'{scene.name}' has no spectral materials", remedy="build a scene first")
-    remove(scene)
-    tree = _group(scene, shown)
-    for material in state.managed_materials(scene).values():
-        _insert(material, tree)
-    scene[EYE_PROPERTY] = 0.0
-    kept = scene.spectral_booth
-    kept.display_left, kept.display_right, kept.display_notes = left, right, "; ".join(shown.notes)
-    return shown
+    return Shown(eyes, whites)
 
 
-def remove(scene: bpy.types.Scene) -> None:
-    """Show the scene's own colours again."""
-    groups = set()
-    for material in state.managed_materials(scene).values():
-        nodes = material.node_tree.nodes
-        if _NODES[0] not in nodes:
-            continue
-        groups.add(nodes[_NODES[1]].node_tree)
-        _link(material, nodes[_NODES[0]].inputs[0].links[0].from_socket)
-        for name in _NODES:
-            nodes.remove(nodes[name])
-    for tree in groups:
-        parts = {node.node_tree for node in tree.nodes if node.type == "GROUP"}
-        bpy.data.node_groups.remove(tree)
-        for part in parts:
-            display_nodes.remove_group(part)
-    kept = scene.spectral_booth
-    kept.display_left = kept.display_right = kept.display_notes = ""
-
-
-@contextmanager
-def scene_linear(scene: bpy.types.Scene) -> Iterator[None]:
-    """The scene's own colours for the block, for whoever measures them in a render."""
-    shown = [
-        material
-        for material in state.managed_materials(scene).values()
-        if _NODES[0] in material.node_tree.nodes
-    ]  # fmt: skip
-    for material in shown:
-        _link(material, material.node_tree.nodes[_NODES[0]].inputs[0].links[0].from_socket)
-    try:
-        yield
-    finally:
-        for material in shown:
-            _link(material, material.node_tree.nodes[_NODES[2]].outputs[0])
-
-
-def _insert(material: bpy.types.Material, tree: bpy.types.NodeTree) -> None:
-    """Between a material's shader and its output: lit colour, display, emission."""
-    nodes, links = material.node_tree.nodes, material.node_tree.links
-    shader = _output(material).inputs["Surface"].links[0].from_socket
-    kinds = ("ShaderNodeShaderToRGB", "ShaderNodeGroup", "ShaderNodeEmission")
-    lit, display, emission = (nodes.new(kind) for kind in kinds)
-    for column, (node, name) in enumerate(zip((lit, display, emission), _NODES, strict=True)):
-        node.name = node.label = name
-        node.location = (400 + 180 * column, -240)
-    display.node_tree = tree
-    links.new(shader, lit.inputs[0])
-    links.new(lit.outputs["Color"], display.inputs[0])
-    links.new(display.outputs[0], emission.inputs["Color"])
-    _link(material, emission.outputs[0])
-
-
-def _output(material: bpy.types.Material) -> bpy.types.Node:
-    return next(node for node in material.node_tree.nodes if node.type == "OUTPUT_MATERIAL")
-
-
-def _link(material: bpy.types.Material, shader: bpy.types.NodeSocket) -> None:
-    material.node_tree.links.new(shader, _output(material).inputs["Surface"])
-
-
-def _group(scene: bpy.types.Scene, shown: Shown) -> bpy.types.NodeTree:
-    """Scene-linear Rec.709 to what must be emitted, through one display or the one of the eye being drawn."""
-    tree = bpy.data.node_groups.new(f"{GROUP} {scene.name}", "ShaderNodeTree")
-    tree.interface.new_socket("Color", in_out="INPUT", socket_type="NodeSocketColor")
-    tree.interface.new_socket("Emission", in_out="OUTPUT", socket_type="NodeSocketColor")
-    build = display_nodes.Builder(tree)
-    matrix = srgb_to_XYZ_matrix()
+def group(name: str, shown: Shown, from_XYZ: bool) -> bpy.types.NodeTree:
+    """XYZ, or linear Rec.709, to what must be emitted, through one display or the one of the eye being drawn."""
+    tree = new_group(name, {"Color": "Vector" if from_XYZ else "Color"}, {"Emission": "Color"})
+    build = Builder(tree)
+    matrix = np.eye(3) if from_XYZ else srgb_to_XYZ_matrix()
     emitted = []
     for profile, scale in zip(shown.eyes, shown.scene_whites, strict=True):
-        XYZ = build.combine([build.dot(build.input, row) for row in matrix * scale])
+        XYZ = build.matrix(matrix * scale, build.inputs["Color"])
         emitted.append(build.group(display_nodes.display_group(profile, profile.name), XYZ))
     if len(emitted) == 1:
         build.finish(emitted[0])
@@ -149,3 +72,11 @@ def _group(scene: bpy.types.Scene, shown: Shown) -> bpy.types.NodeTree:
         eye = build.attribute(EYE_PROPERTY)
         build.finish(build.combine(build.mix(eye, *(build.separate(each) for each in emitted))))
     return tree
+
+
+def remove_group(tree: bpy.types.NodeTree) -> None:
+    """Remove a node group, and those of displays that only it shows."""
+    parts = {node.node_tree for node in tree.nodes if node.type == "GROUP"}
+    bpy.data.node_groups.remove(tree)
+    for part in parts:
+        display_nodes.remove_group(part)

@@ -1,4 +1,8 @@
-"""Materials of surfaces: one colour or one image on a diffuse shader, and a neutral gloss."""
+"""Materials of surfaces: a base that is lit as any material is, and its one socket of colour.
+
+The base is a diffuse shader with a neutral gloss, or a user's own Principled shader (`adopting`). What
+gives it its colour, and what comes after lighting, is put round it by `shading` and can be taken away again.
+"""
 
 from __future__ import annotations
 
@@ -6,17 +10,19 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
-import numpy as np
 
-from spectral_core.arrays import Float64Array
+from spectral_core.errors import BlenderError
 from spectral_core.surfaces import Surface
 
-from .images import write_image
+from . import live
 from .state import SURFACE_KEY
 
 DIFFUSE = "Spectral Diffuse"
-IMAGE = "Spectral Image"
-GLOSS = "Spectral Gloss"
+GLOSSY = "Spectral Gloss"
+# Of a user's own material: the name of its Principled node.
+PRINCIPLED_KEY = "spectral_booth_principled"
+# The same, as JSON: node and socket that told the texture of its base colour where on the surface it is.
+PLACE_KEY = "spectral_booth_place"
 # Reflectance at normal incidence of the Fresnel node's IOR below; the gloss is relative to it.
 _FRESNEL_IOR = 1.5
 _FRESNEL_F0 = 0.04
@@ -43,83 +49,114 @@ def make_material(surface: Surface, forward: bool) -> bpy.types.Material:
     if surface.gloss > 0:
         shader = _add_gloss(material, shader, surface)
     links.new(shader, output.inputs["Surface"])
-    if surface.texture is not None:
-        _add_image_node(material, surface, diffuse)
     return material
 
 
-def set_colour(material: bpy.types.Material, rgb: Float64Array) -> int:
-    """Give a material one linear RGB (3,), or an image of linear RGB (height, width, 3) from the top.
+def colour_socket(material: bpy.types.Material) -> bpy.types.NodeSocket:
+    """The socket of the base that takes the surface's colour.
 
-    Negative values do not exist in Blender's working space: they become 0. Returns how many
-    colours (pixels) that changed.
+    Raises
+    ------
+    BlenderError
+        If a user removed or renamed the node.
     """
-    kept = np.maximum(rgb, 0.0)
-    clipped = int((rgb < 0).any(axis=-1).sum())
-    if rgb.ndim == 1:
-        socket = material.node_tree.nodes[DIFFUSE].inputs["Color"]
-        socket.default_value = (*kept.tolist(), 1.0)
-    else:
-        write_image(material.node_tree.nodes[IMAGE].image, kept.astype(np.float32))
-    return clipped
-
-
-def stored_colour(material: bpy.types.Material) -> Float64Array:
-    """What the material holds, in the precision it is stored in: (3,) or (height, width, 3)."""
-    node = material.node_tree.nodes.get(IMAGE)
+    name = str(material.get(PRINCIPLED_KEY, DIFFUSE))
+    node = material.node_tree.nodes.get(name)
     if node is None:
-        socket = material.node_tree.nodes[DIFFUSE].inputs["Color"]
-        return np.array(socket.default_value[:3], dtype=np.float64)
-    image = node.image
-    pixels = np.empty(image.size[0] * image.size[1] * 4, dtype=np.float32)
-    image.pixels.foreach_get(pixels)
-    return pixels.reshape(image.size[1], image.size[0], 4)[::-1, :, :3].astype(np.float64)
+        raise BlenderError(
+            f"'{material.name}' has no node '{name}' any more",
+            remedy="undo what removed or renamed it, or give its objects another material",
+        )
+    return node.inputs["Base Color" if PRINCIPLED_KEY in material else "Color"]
+
+
+def output_of(tree: bpy.types.NodeTree, node: str, identifier: str) -> bpy.types.NodeSocket | None:
+    """An output of a tree's node by names that were kept; None if a user removed or renamed it."""
+    outputs = tree.nodes[node].outputs if node in tree.nodes else ()
+    return next((each for each in outputs if each.identifier == identifier), None)
+
+
+def base_shader(material: bpy.types.Material) -> bpy.types.NodeSocket:
+    """The shader of the base: what the output shows unless something comes after lighting."""
+    node = colour_socket(material).node
+    if PRINCIPLED_KEY in material:
+        return node.outputs[0]
+    followers = [link.to_node for link in node.outputs[0].links if link.to_node.type == "ADD_SHADER"]
+    return (followers[0] if followers else node).outputs[0]
+
+
+def gloss_shader(material: bpy.types.Material) -> bpy.types.NodeSocket | None:
+    """The gloss of a base of ours, None if it has none."""
+    node = material.node_tree.nodes.get(GLOSSY)
+    return None if node is None else node.outputs[0]
 
 
 def has_gloss(material: bpy.types.Material) -> bool:
-    """Whether the material has a neutral gloss on top."""
-    return GLOSS in material.node_tree.nodes
+    """Whether the surface reflects anything but its colour."""
+    return PRINCIPLED_KEY in material or GLOSSY in material.node_tree.nodes
 
 
-def set_gloss_colour(material: bpy.types.Material, rgb: Float64Array) -> None:
-    """Colour (3,) of the gloss relative to the lamps; white unless the light is in the materials."""
-    if has_gloss(material):
-        material.node_tree.nodes[GLOSS].inputs[0].default_value = rgb.tolist()
+def not_coded(material: bpy.types.Material) -> list[str]:
+    """What coded lamps do not show of a user's own material."""
+    if PRINCIPLED_KEY not in material:
+        return []
+    node = colour_socket(material).node
+    found = []
+    for name, neutral, what in (
+        ("Alpha", 1.0, "is transparent: coded lamps show it solid"),
+        ("Emission Strength", 0.0, "emits light of its own: coded lamps take it for a lamp's"),
+        ("Transmission Weight", 0.0, "lets light through: coded lamps do not show that"),
+        ("Subsurface Weight", 0.0, "scatters light inside: coded lamps take the radii of its channels for lights'"),
+        ("Thin Film Thickness", 0.0, "has a thin film: coded lamps take its channels for lights"),
+    ):
+        socket = node.inputs.get(name)
+        if socket is not None and (socket.links or socket.default_value != neutral):
+            found.append(f"{material.name} {what}")
+    for weight, tint in (("", "Specular Tint"), ("Coat Weight", "Coat Tint"), ("Sheen Weight", "Sheen Tint")):
+        socket, part = node.inputs.get(tint), node.inputs.get(weight)
+        there = part is None or part.links or part.default_value
+        if there and socket is not None and (socket.links or len(set(socket.default_value[:3])) > 1):
+            found.append(f"{material.name} has a {tint}: coded lamps take its channels for lights, use grey")
+    return found
+
+
+def output_node(material: bpy.types.Material) -> bpy.types.Node:
+    """The output that Eevee renders: there may be others, for Cycles or to choose from.
+
+    Raises
+    ------
+    BlenderError
+        If there is none.
+    """
+    found = material.node_tree.get_output_node("EEVEE")
+    if found is None:
+        raise BlenderError(f"'{material.name}' has no output that Eevee renders", remedy="add a Material Output node")
+    return found
+
+
+def show(material: bpy.types.Material, shader: bpy.types.NodeSocket) -> None:
+    """Link a shader to the output."""
+    material.node_tree.links.new(shader, output_node(material).inputs["Surface"])
 
 
 @contextmanager
 def uniform(material: bpy.types.Material, value: float) -> Iterator[None]:
-    """Show a grey of `value` under white gloss instead of the surface's colour; restored afterwards."""
-    tree = material.node_tree
-    socket = tree.nodes[DIFFUSE].inputs["Color"]
+    """Show the base alone with a grey of `value` instead of the surface's colour; restored afterwards."""
+    links = material.node_tree.links
+    socket, output = colour_socket(material), output_node(material).inputs["Surface"]
+    colour, shown = tuple(socket.default_value), output.links[0].from_socket
     sources = [link.from_socket for link in socket.links]
-    colour = tuple(socket.default_value)
-    gloss = np.array(tree.nodes[GLOSS].inputs[0].default_value) if has_gloss(material) else np.ones(3)
     for link in list(socket.links):
-        tree.links.remove(link)
+        links.remove(link)
     socket.default_value = (value, value, value, 1.0)
-    set_gloss_colour(material, np.ones(3))
+    show(material, base_shader(material))
     try:
         yield
     finally:
         socket.default_value = colour
-        set_gloss_colour(material, gloss)
         for source in sources:
-            tree.links.new(source, socket)
-
-
-def _add_image_node(material: bpy.types.Material, surface: Surface, diffuse: bpy.types.Node) -> None:
-    texture = surface.texture
-    assert texture is not None
-    image = bpy.data.images.new(
-        f"{surface.name} (spectral)", texture.width, texture.height, float_buffer=True, is_data=True
-    )
-    image.use_half_precision = False
-    node = material.node_tree.nodes.new("ShaderNodeTexImage")
-    node.name = node.label = IMAGE
-    node.location = (-320, 0)
-    node.image = image
-    material.node_tree.links.new(node.outputs["Color"], diffuse.inputs["Color"])
+            links.new(source, socket)
+        show(material, shown)
 
 
 def _add_gloss(material: bpy.types.Material, diffuse: bpy.types.NodeSocket, surface: Surface) -> bpy.types.NodeSocket:
@@ -133,15 +170,18 @@ def _add_gloss(material: bpy.types.Material, diffuse: bpy.types.NodeSocket, surf
     scale.location = (-140, -240)
     scale.inputs[1].default_value = surface.gloss / _FRESNEL_F0
     links.new(fresnel.outputs[0], scale.inputs[0])
-    glossy = nodes.new("ShaderNodeBsdfAnisotropic")
-    glossy.location = (40, -160)
-    glossy.inputs["Roughness"].default_value = surface.roughness
+    colour = nodes.new("ShaderNodeAttribute")
+    colour.attribute_type, colour.attribute_name = "VIEW_LAYER", live.GLOSS
+    colour.location = (-320, -420)
     tint = nodes.new("ShaderNodeVectorMath")
-    tint.name = tint.label = GLOSS
     tint.operation = "SCALE"
     tint.location = (-140, -420)
-    tint.inputs[0].default_value = (1.0, 1.0, 1.0)
+    links.new(colour.outputs["Vector"], tint.inputs[0])
     links.new(scale.outputs[0], tint.inputs["Scale"])
+    glossy = nodes.new("ShaderNodeBsdfAnisotropic")
+    glossy.name = glossy.label = GLOSSY
+    glossy.location = (40, -160)
+    glossy.inputs["Roughness"].default_value = surface.roughness
     links.new(tint.outputs[0], glossy.inputs["Color"])
     total = nodes.new("ShaderNodeAddShader")
     total.location = (220, 0)

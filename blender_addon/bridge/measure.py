@@ -11,7 +11,7 @@ import numpy as np
 
 from spectral_core.arrays import BoolArray, Float32Array, Float64Array
 
-from . import materials, state
+from . import live, materials, state
 from .render import render_linear
 
 # The reconstruction filter is 1.5 pixels wide: two pixels from an edge nothing else is mixed in.
@@ -67,7 +67,7 @@ def illumination(scene: bpy.types.Scene, within: BoolArray | None = None) -> Ill
     with _cropped(scene, within):
         with _neutral(scene, 1.0):
             white = render_linear(scene).pixels[..., 1]
-        if not any(materials.has_gloss(item) for item in state.managed_materials(scene).values()):
+        if not any(map(materials.has_gloss, state.all_managed_materials(scene))):
             return Illumination(white, np.zeros_like(white))
         with _neutral(scene, 0.0):
             gloss = render_linear(scene).pixels[..., 1]
@@ -94,7 +94,8 @@ def _neutral(scene: bpy.types.Scene, value: float) -> Iterator[None]:
     """All surfaces of one grey, all lamps of unit colour; restored afterwards."""
     colours = [(lamp.data, tuple(lamp.data.color)) for lamp in state.managed_lamps(scene)]
     with ExitStack() as stack:
-        for material in state.managed_materials(scene).values():
+        stack.enter_context(live.white_gloss(scene))
+        for material in state.all_managed_materials(scene):
             stack.enter_context(materials.uniform(material, value))
         for data, _ in colours:
             data.color = (1.0, 1.0, 1.0)

@@ -14,6 +14,7 @@ import bpy
 import numpy as np
 
 from spectral_core.arrays import Float32Array
+from spectral_core.display.export import XYZ_VIEW
 from spectral_core.errors import BlenderError
 from spectral_core.files import atomic_path
 
@@ -47,6 +48,12 @@ def render_png(scene: bpy.types.Scene, path: Path, stereo: bool = False) -> floa
 
     With `stereo` both eyes side by side, left eye left, converging where the camera looks.
     """
+    kept, view = scene.spectral_booth, scene.view_settings.view_transform
+    if kept.is_managed and kept.target == "WIDE" and view != XYZ_VIEW:
+        raise BlenderError(
+            f"surfaces emit XYZ, which the view '{view}' does not show",
+            remedy=f"start Blender with an exported config and its view '{XYZ_VIEW}', or choose the target Window",
+        )
     started = time.perf_counter()
     with atomic_path(path) as temporary, _output(scene, temporary, "PNG", "8"), _both_eyes(scene, stereo):
         _render(scene)

@@ -34,7 +34,7 @@ from spectral_core.verification import (
     worst_stages,
 )
 
-from . import headset, lighting, materials, measure, state
+from . import encoded, lighting, measure, state, ways
 from .render import render_linear
 
 # Fewer pixels than this are no reading: 5 x 5 inside the border.
@@ -110,6 +110,7 @@ def verify_steps(
     description = state.description(scene)
     for light in lights:
         resolve_light(light, description.folder)  # refuse a wrong name before the first render
+    ways.learn(scene, lights)
     with as_found(scene):
         yield Step(0.0, "what the camera sees")
         view = survey(scene)
@@ -120,17 +121,18 @@ def verify_steps(
             for level in levels:
                 yield Step((index + levels.index(level) / len(levels)) / len(lights), f"{light}, level {level}")
                 started = time.perf_counter()
-                applied = lighting.apply(scene, light, level)
+                applied = ways.light(scene, light, level, only=True)
                 switched = time.perf_counter() - started
                 rendered = render_linear(scene)
+                pixels = applied.linear_rgb(rendered.pixels).astype(np.float32)
                 if images:
-                    write_png(images / f"{file_name(light)}_level{level}.png", rendered.pixels)
-                gloss = (applied.lighting.lamp_rgb * applied.lighting.gloss_rgb).astype(np.float32)
-                diffuse = rendered.pixels - view.illumination.gloss[..., None] * gloss
-                readings = read_patches(scene, applied.lighting, diffuse, view)
+                    write_png(images / f"{file_name(light)}_level{level}.png", pixels)
+                gloss = applied.gloss_rgb.astype(np.float32)
+                diffuse = pixels - view.illumination.gloss[..., None] * gloss
+                readings = read_patches(scene, applied, diffuse, view)
                 found[level] = compare(readings, applied.lighting, switched, rendered.seconds)
                 if level == max(levels):
-                    met = conditions(applied.lighting, applied.clipped, applied.extended)
+                    met = conditions(applied.lighting, *_clipped_and_extended(scene, applied))
                     textures = _read_textures(scene, applied.lighting, diffuse, view)
             results.append(LightResult(light, found, textures, met))
         return results
@@ -140,11 +142,11 @@ def verify_steps(
 def as_found(scene: bpy.types.Scene) -> Iterator[None]:
     """The scene's own colours for the block, not a headset's codes; its light and level put back afterwards."""
     before = (scene.spectral_booth.light, int(scene.spectral_booth.level))
-    with headset.scene_linear(scene):
+    with ways.scene_linear(scene):
         try:
             yield
         finally:
-            lighting.apply(scene, *before)
+            ways.light(scene, *before)
 
 
 def summary(results: Sequence[LightResult]) -> str:
@@ -167,7 +169,7 @@ def _mean_and_max(spreads: Sequence[Percentiles]) -> str:
 def document(scene: bpy.types.Scene, results: Sequence[LightResult], seconds: float) -> Document:
     """The JSON of `verify`."""
     description = state.description(scene)
-    return verify_document(
+    document = verify_document(
         results,
         worst_stages(list(results)),
         left_out(scene),
@@ -177,6 +179,22 @@ def document(scene: bpy.types.Scene, results: Sequence[LightResult], seconds: fl
         file=bpy.data.filepath,
         seconds=seconds,
     )
+    return {**document, **shown_document(scene)}
+
+
+def shown_document(scene: bpy.types.Scene) -> Document:
+    """How the scene is shown, for JSON: its lamps, and its basis if it has one."""
+    kept, basis = scene.spectral_booth, encoded.basis_of(scene)
+    described = {"lamps": kept.way.lower(), "basis": None}
+    if basis is not None:
+        described["basis"] = {
+            "K": basis.K,
+            "lights": list(basis.light_names),
+            "tolerance_dE00": round(kept.basis_tolerance, 6),
+            "largest_dE00": kept.basis_error,
+            "half": kept.basis_half,
+        }
+    return described
 
 
 def json_path() -> Path:
@@ -202,7 +220,9 @@ def left_out(scene: bpy.types.Scene) -> list[str]:
     textured = [surface for surface in surfaces.values() if surface.texture is not None]
     megabytes = sum(each.texture.width * each.texture.height for each in textured if each.texture) * 16 / 1e6
     lines = [f"images for {uniform} uniform surfaces: each is one constant"]
-    if textured:
+    if textured and encoded.basis_of(scene) is not None:
+        lines.append("images for single lights: coefficients serve them all, and a switch computes none")
+    elif textured:
         others = len(description.lights) - 1
         lines.append(
             f"images for the {others} lights not shown: {others * megabytes:.0f} MB; a switch computes the "
@@ -230,11 +250,26 @@ def _illumination(
     return measure.Illumination(irradiance, np.zeros_like(irradiance))
 
 
+def _clipped_and_extended(scene: bpy.types.Scene, applied: lighting.Applied) -> tuple[dict[str, int], dict[str, float]]:
+    """Per surface, colours (pixels) that lose a negative channel, and the share that rests on extended ends."""
+    description, shown = state.description(scene), applied.lighting
+    reference = resolve_light(description.reference, description.folder)
+    surfaces = {surface.name: surface for _, surface in state.shown_surfaces(scene)}
+    clipped = {
+        name: 0 if applied.coded else int((shown.material_rgb(surface, reference) < 0).any(axis=-1).sum())
+        for name, surface in surfaces.items()
+    }
+    extended = {name: surface.extended(shown.light) if shown.level == 2 else 0.0 for name, surface in surfaces.items()}
+    return clipped, extended
+
+
 def _is_patch(item: bpy.types.Object) -> bool:
     return state.surface_name(item).startswith("colorchecker ") and len(item.data.polygons) == 1
 
 
-def read_patches(scene: bpy.types.Scene, applied: Lighting, rendered: Float32Array, view: View) -> list[PatchReading]:
+def read_patches(
+    scene: bpy.types.Scene, applied: lighting.Applied, rendered: Float32Array, view: View
+) -> list[PatchReading]:
     """Mean colours of the ColorChecker's patches, of all uniform surfaces without one."""
     surfaces = scene_surfaces(state.description(scene))
     shown = state.managed_materials(scene)
@@ -253,8 +288,8 @@ def read_patches(scene: bpy.types.Scene, applied: Lighting, rendered: Float32Arr
                 surface=name,
                 rendered=rendered[mask].mean(axis=0, dtype=np.float64),
                 irradiance=float(view.illumination.irradiance[mask].mean(dtype=np.float64)),
-                stored=materials.stored_colour(shown[name]),
-                exact=applied.exact_rgb(surfaces[name]),
+                stored=lighting.surface_rgb(scene, shown[name], applied),
+                exact=applied.lighting.exact_rgb(surfaces[name]),
             )
         )
     return readings

@@ -19,16 +19,16 @@ class ShownPatch:
 
     Attributes
     ----------
-    linear
-        (n, 3) scene-linear Rec.709.
+    pixels
+        (n, 3) scene-linear: Rec.709, or XYZ where the renderer holds that.
     codes
         (n, 3) device codes, 0 to 1, of the same pixels through the display transform.
     exact
-        (3,) scene-linear Rec.709 of theory, mean over the pixels.
+        (3,) the same of theory, mean over the pixels.
     """
 
     name: str
-    linear: Float64Array
+    pixels: Float64Array
     codes: Float64Array
     exact: Float64Array
 
@@ -49,7 +49,7 @@ class ShownLight:
         What transform and renderer are off by together.
     lost
         Patches outside the renderer's working space, whose negative channels it shows as 0; they are
-        left out of `theory8`.
+        left out of `theory8`. None where its pixels are XYZ.
     patches, in_gamut
         How many were read, and how many of them need no clipping on the display.
     """
@@ -67,15 +67,15 @@ class ShownLight:
         return asdict(self)
 
 
-def compare_shown(name: str, patches: list[ShownPatch], profile: DisplayProfile) -> ShownLight:
-    """Compare the codes of a light's patches with a profile's."""
-    linear = np.concatenate([patch.linear for patch in patches])
-    wanted = _wanted(linear, profile)
+def compare_shown(name: str, patches: list[ShownPatch], profile: DisplayProfile, in_XYZ: bool = False) -> ShownLight:
+    """Compare the codes of a light's patches with a profile's; pixels are linear Rec.709 unless `in_XYZ`."""
+    to_XYZ = np.eye(3) if in_XYZ else srgb_to_XYZ_matrix()
+    wanted = profile.to_codes(np.concatenate([patch.pixels for patch in patches]) @ to_XYZ.T)
     difference = 255 * np.abs(np.concatenate([patch.codes for patch in patches]) - np.clip(wanted, 0, 1))
     inside = in_gamut(wanted)
     theory = np.array([patch.exact for patch in patches])
     held = (theory >= -GAMUT_TOLERANCE).all(axis=1)
-    exact = _wanted(theory, profile)
+    exact = profile.to_codes(theory @ to_XYZ.T)
     shown = np.array([patch.codes.mean(axis=0) for patch in patches])
     fits = in_gamut(exact)
     return ShownLight(
@@ -87,7 +87,3 @@ def compare_shown(name: str, patches: list[ShownPatch], profile: DisplayProfile)
         len(patches),
         int(fits.sum()),
     )
-
-
-def _wanted(linear: Float64Array, profile: DisplayProfile) -> Float64Array:
-    return profile.to_codes(linear @ srgb_to_XYZ_matrix().T)
