@@ -45,7 +45,8 @@ def build(arguments: argparse.Namespace) -> Result:
     from spectral_core.scene import load_scene
 
     from .bridge import build as building
-    from .bridge import lighting
+    from .bridge import encoded, lighting, ways
+    from .bridge import verify as verifying
 
     started = time.perf_counter()
     description = load_scene(arguments.scene)
@@ -57,6 +58,12 @@ def build(arguments: argparse.Namespace) -> Result:
     built = building.build_scene(scene, description)
     progress(0.4, "calibrating the white")
     calibrated = lighting.calibrate_white(scene)
+    if arguments.live is not None:
+        progress(0.6, "encoding the surfaces")
+        steps = encoded.encoding_steps(scene, encoded.lights_of(scene), arguments.live, arguments.half)
+        ways.show_encoded(scene, ways.finished(steps))
+    if arguments.lamps == "coded":
+        ways.set_way(scene, "CODED")
     _save(output)
     return {
         "file": str(output),
@@ -64,17 +71,18 @@ def build(arguments: argparse.Namespace) -> Result:
         "materials": built.materials,
         "lights": built.lights,
         "white_luminance": calibrated.after,
+        **verifying.shown_document(scene),
         "seconds": time.perf_counter() - started,
     }
 
 
 def render(arguments: argparse.Namespace) -> Result:
     """Render a .blend under a light at a level to PNG."""
-    from .bridge import lighting
+    from .bridge import ways
     from .bridge.render import render_png
 
     scene = _open(arguments.file)
-    applied = lighting.apply(scene, arguments.light or scene.spectral_booth.light, _level(arguments, scene))
+    applied = ways.light(scene, arguments.light or scene.spectral_booth.light, _level(arguments, scene))
     progress(0.1, f"rendering {applied.lighting.light.name}")
     seconds = render_png(scene, arguments.output, arguments.stereo)
     return {
@@ -107,14 +115,14 @@ def _verify_display(arguments: argparse.Namespace, scene: bpy.types.Scene, light
     from .bridge.display import Display, verify_display
 
     profile = load_profile(arguments.profile)
-    display = Display(arguments.display or profile.name, arguments.view)
+    display = Display(arguments.display or profile.name, arguments.view, arguments.xyz_view)
     results = verify_display(scene, lights, profile, display, progress)
     return {
         "scene": scene.spectral_booth.description.name.removesuffix(".toml"),
         "blender": bpy.app.version_string,
         "profile": profile.name,
         "display": display.name,
-        "view": display.view,
+        "view": display.xyz_view if scene.spectral_booth.way == "CODED" else display.view,
         "lights": [each.to_json() for each in results],
     }
 
@@ -200,6 +208,7 @@ def _print(result: Result, path: Path | None) -> None:
 
 
 def _parser() -> argparse.ArgumentParser:
+    from spectral_core.display.export import XYZ_VIEW
     from spectral_core.imaging import IMAGE_FORMATS
     from spectral_core.textures.base import KINDS
 
@@ -215,6 +224,9 @@ def _parser() -> argparse.ArgumentParser:
     command = verb("build", build)
     command.add_argument("scene", type=Path)
     command.add_argument("-o", "--output", type=Path, required=True)
+    command.add_argument("--live", type=float, help="encode surfaces in a basis of this largest dE00")
+    command.add_argument("--half", action="store_true", help="images of half floats")
+    command.add_argument("--lamps", choices=("coloured", "coded"), default="coloured")
     command = verb("render", render)
     command.add_argument("file", type=Path, nargs="?", help="a .blend; the open file if left out")
     command.add_argument("--light", help="name or file; the scene's own if left out")
@@ -229,6 +241,7 @@ def _parser() -> argparse.ArgumentParser:
     command.add_argument("--profile", help="compare the codes of the profile's display instead, see --display")
     command.add_argument("--display", help="its name in the OpenColorIO config that Blender was started with")
     command.add_argument("--view", default="Standard")
+    command.add_argument("--xyz-view", default=XYZ_VIEW, help="its view for scenes of coded lamps")
     verb("config", config)
     command = verb("bake", bake_texture)
     command.add_argument("file", type=Path)

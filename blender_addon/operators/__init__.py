@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bpy
 
+from .adopt import AdoptMaterials, ReleaseMaterials
 from .build import BuildScene
 from .display import AddDisplayGroup, ClearDisplay, SetDisplay
 from .light import CalibrateWhite, SetLevel, SetLight
@@ -11,6 +12,7 @@ from .patches import PlayPatches
 from .render import RenderScene
 from .textures import BakeTexture
 from .verify import VerifyScene
+from .ways import BakeColours, Encode, SetLampLight, SetMixture, SetWay
 
 _classes = (
     BuildScene,
@@ -24,6 +26,13 @@ _classes = (
     AddDisplayGroup,
     PlayPatches,
     BakeTexture,
+    SetWay,
+    Encode,
+    BakeColours,
+    SetMixture,
+    SetLampLight,
+    AdoptMaterials,
+    ReleaseMaterials,
 )
 
 

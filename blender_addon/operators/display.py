@@ -32,9 +32,9 @@ class SetDisplay(ManagedScene, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Put the display into the materials."""
         with reported(self) as outcome:
-            from ..bridge import headset
+            from ..bridge import ways
 
-            for note in headset.apply(context.scene, self.left, self.right).notes:
+            for note in ways.show_in_headset(context.scene, self.left, self.right).notes:
                 self.report({"INFO"}, note)
         return outcome.status
 
@@ -80,7 +80,7 @@ class ClearDisplay(ManagedScene, bpy.types.Operator):
     def execute(self, context: bpy.types.Context) -> set[str]:
         """Take the display out of the materials."""
         with reported(self) as outcome:
-            from ..bridge import headset
+            from ..bridge import ways
 
-            headset.remove(context.scene)
+            ways.show_in_window(context.scene)
         return outcome.status

@@ -7,7 +7,8 @@ import bpy
 from .common import ManagedScene, busy, reported
 
 
-def _lights(operator: object, context: bpy.types.Context, text: str) -> list[str]:
+def scene_lights(operator: object, context: bpy.types.Context, text: str) -> list[str]:
+    """Names of the scene's lights that contain a text, to choose from."""
     return [each.name for each in context.scene.spectral_booth.lights if text.casefold() in each.name.casefold()]
 
 
@@ -19,7 +20,7 @@ class SetLight(ManagedScene, bpy.types.Operator):
     bl_options = {"REGISTER", "UNDO"}
 
     light: bpy.props.StringProperty(  # type: ignore[valid-type]
-        name="Light", description="Built-in name or file", search=_lights, search_options={"SORT", "SUGGESTION"}
+        name="Light", description="Built-in name or file", search=scene_lights, search_options={"SORT", "SUGGESTION"}
     )
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
@@ -73,8 +74,8 @@ class CalibrateWhite(ManagedScene, bpy.types.Operator):
 
 def _apply(operator: bpy.types.Operator, context: bpy.types.Context, light: str, level: int) -> set[str]:
     with reported(operator) as outcome:
-        from ..bridge.lighting import apply
+        from ..bridge.ways import light as show
 
-        for note in apply(context.scene, light, level).lighting.notes:
+        for note in show(context.scene, light, level).lighting.notes:
             operator.report({"INFO"}, note)
     return outcome.status

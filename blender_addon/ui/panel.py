@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import textwrap
-
 import bpy
 
+from .lines import draw_lines
+
 CATEGORY = "Spectral Booth"
-# Mean width of a character of the interface's font, at a scale of 1.
-_CHARACTER_PIXELS = 7.0
-# Borders of a box on both sides, and of an icon before the text.
-_BOX_PIXELS = 60.0
 
 
 class LightMenu(bpy.types.Menu):
@@ -25,6 +21,10 @@ class LightMenu(bpy.types.Menu):
         for each in state.lights:
             icon = "RADIOBUT_ON" if each.name == state.light else "RADIOBUT_OFF"
             self.layout.operator("spectral_booth.set_light", text=each.name, icon=icon).light = each.name
+        self.layout.separator()
+        self.layout.operator_context = "INVOKE_DEFAULT"
+        self.layout.operator("spectral_booth.set_light", text="Other…", icon="FILEBROWSER").light = ""
+        self.layout.operator("spectral_booth.set_mixture", text="Mixture…", icon="NODE_COMPOSITING").light_1 = ""
 
 
 class ScenePanel(bpy.types.Panel):
@@ -49,6 +49,7 @@ class BuildPanel(bpy.types.Panel):
 
     bl_idname = "SPECTRAL_BOOTH_PT_build"
     bl_label = "Build Another Scene"
+    bl_order = 4
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = CATEGORY
@@ -70,6 +71,7 @@ class DisplayPanel(bpy.types.Panel):
 
     bl_idname = "SPECTRAL_BOOTH_PT_display"
     bl_label = "Display"
+    bl_order = 3
     bl_space_type = "VIEW_3D"
     bl_region_type = "UI"
     bl_category = CATEGORY
@@ -84,13 +86,13 @@ class DisplayPanel(bpy.types.Panel):
             row.operator("spectral_booth.set_display", text="Headset Profile…", icon="VIEW_CAMERA").left = ""
             if state.display_left:
                 row.operator("spectral_booth.clear_display", text="", icon="X")
-                _draw_lines(self.layout.box(), context, state.display_notes.split("; "), "INFO")
+                draw_lines(self.layout.box(), context, state.display_notes.split("; "), "INFO")
         playing = context.window_manager.spectral_booth_player
         row = self.layout.row()
         row.enabled = not playing
         row.operator("spectral_booth.play_patches", text="Play Patches…", icon="PLAY")
         if playing:
-            _draw_lines(self.layout.box(), context, [playing, "Esc stops"], "RENDER_ANIMATION")
+            draw_lines(self.layout.box(), context, [playing, "Esc stops"], "RENDER_ANIMATION")
 
 
 def _draw_build(layout: bpy.types.UILayout) -> None:
@@ -113,7 +115,7 @@ def _draw_controls(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
         chosen = state.level == str(level)
         row.operator("spectral_booth.set_level", text=text, depress=chosen).level = level
     if state.notes:
-        _draw_lines(layout.box(), context, state.notes.split("; "), "INFO")
+        draw_lines(layout.box(), context, state.notes.split("; "), "INFO")
     column = layout.column(align=True)
     column.operator("spectral_booth.calibrate_white", icon="LIGHT_SUN")
     column.operator("spectral_booth.render", icon="RENDER_STILL")
@@ -121,17 +123,7 @@ def _draw_controls(layout: bpy.types.UILayout, context: bpy.types.Context) -> No
     row.operator("spectral_booth.verify", text="Verify Light", icon="CHECKMARK").lights = "CURRENT"
     row.operator("spectral_booth.verify", text="Verify All").lights = "ALL"
     if state.result:
-        _draw_lines(layout.box(), context, state.result.split("\n"), "CHECKMARK")
-
-
-def _draw_lines(layout: bpy.types.UILayout, context: bpy.types.Context, lines: list[str], icon: str) -> None:
-    """Lines of text broken to the sidebar's width; the first has the icon."""
-    scale = context.preferences.system.ui_scale
-    width = max(16, int((context.region.width / scale - _BOX_PIXELS) / _CHARACTER_PIXELS))
-    column = layout.column(align=True)
-    column.scale_y = 0.85
-    for number, line in enumerate(part for each in lines for part in textwrap.wrap(each, width)):
-        column.label(text=line, icon="BLANK1" if number else icon)
+        draw_lines(layout.box(), context, state.result.split("\n"), "CHECKMARK")
 
 
 _classes = (LightMenu, ScenePanel, DisplayPanel, BuildPanel)

@@ -14,7 +14,7 @@ from spectral_core.cli.options import FiniteRange, as_json
 from spectral_core.demo import run_demo
 from spectral_core.display import load_profile
 from spectral_core.display.export import export_ocio
-from spectral_core.errors import DisplayError
+from spectral_core.errors import DisplayError, SceneError
 from spectral_core.report.html import ReportInput, SceneRun, find_renders, write_report
 from spectral_core.scene import load_scene
 
@@ -26,13 +26,26 @@ _LIMIT = 0.5
 @click.command()
 @click.argument("scene", type=_PATH)
 @click.option("-o", "--output", type=_PATH, required=True, help="the .blend to write")
+@click.option("--live", type=FiniteRange(0.001), metavar="DE00", help="encode surfaces in a basis of this largest dE00")
+@click.option("--half", is_flag=True, help="with --live: images of half floats")
+@click.option("--lamps", type=click.Choice(["coloured", "coded"]), default="coloured", show_default=True)
 @as_json
-def build(scene: Path, output: Path, json: bool) -> None:
-    """Build the .blend of a SCENE (TOML) and calibrate its white."""
+def build(scene: Path, output: Path, live: float | None, half: bool, lamps: str, json: bool) -> None:
+    """Build the .blend of a SCENE (TOML) and calibrate its white.
+
+    With --live a change of light touches no material or image. Coded lamps mix up to three lights exactly.
+    """
     load_scene(scene)  # a wrong key is told at once, before Blender starts
+    if half and live is None:
+        raise SceneError("--half goes with --live only", remedy="add --live 0.1")
+    arguments = ["build", str(scene), "-o", str(output), "--lamps", lamps]
+    arguments += ["--live", str(live)] if live is not None else []
+    arguments += ["--half"] if half else []
     with progress_bar(f"building {scene.name}") as progress:
-        document = run_verb(["build", str(scene), "-o", str(output)], progress)
-    emit(document, json, lambda console: console.print(facts(document)))
+        document = run_verb(arguments, progress)
+    basis = document["basis"]
+    told = "none" if basis is None else f"{basis['K']} numbers a colour, dE00 at most {basis['largest_dE00']:.2g}"
+    emit(document, json, lambda console: console.print(facts({**document, "basis": told})))
 
 
 @click.command()
@@ -80,7 +93,7 @@ def verify(
 
     Ends with 1 if level 2 differs by more than --limit over the patches in gamut. With --profile the
     display is exported to OpenColorIO, Blender renders level 2 through it, and the codes that come
-    out are compared with the profile's own.
+    out are compared with the profile's own. A scene of coded lamps goes through the export's view of XYZ.
     """
     if profile is not None:
         if levels or images or report:
@@ -116,7 +129,7 @@ def _verify_display(file: Path, lights: Sequence[str], profile: str, limit: floa
     with tempfile.TemporaryDirectory() as folder, progress_bar(f"verifying {file.name}") as progress:
         exported = export_ocio(display, Path(folder) / "ocio", Path(run_verb(["config"])["config"]))
         arguments = ["verify", str(file), "--profile", profile]
-        arguments += ["--display", exported.display, "--view", exported.view]
+        arguments += ["--display", exported.display, "--view", exported.view, "--xyz-view", exported.xyz_view]
         arguments += [part for light in lights for part in ("--light", light)]
         document = run_verb(arguments, progress, exported.config)
     failed = [each["name"] for each in document["lights"] if each["codes8"]["max"] > limit]
@@ -146,7 +159,10 @@ def add_blender_commands(group: click.Group) -> None:
 
 
 def _title(document: Document) -> str:
-    return f"{document['scene']}, Blender {document['blender']}: 8-bit differences per channel and dE00 from theory"
+    basis = document.get("basis")
+    surfaces = "baked surfaces" if basis is None else f"{basis['K']} numbers a colour"
+    how = f"{document.get('lamps', 'coloured')} lamps, {surfaces}"
+    return f"{document['scene']}, {how}, Blender {document['blender']}: 8-bit differences and dE00 from theory"
 
 
 _COLUMNS = ("light", "level", "R", "G", "B", "max", "dE00", "max", "s")
