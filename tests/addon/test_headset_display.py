@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 import pytest
 
-from blender_addon.bridge import headset, measure
+from blender_addon.bridge import measure, ways
 from blender_addon.bridge.render import render_linear
 from blender_addon.eyes import EYE_PROPERTY
 from spectral_core.display import load_profile, srgb_encode, write_profile
@@ -40,7 +40,7 @@ def test_materials_emit_what_makes_the_headset_show_the_profiles_codes(chart: bp
 
 def test_each_eye_has_its_own_profile(chart: bpy.types.Scene) -> None:
     linear = _shown(chart)
-    headset.apply(chart, "htc-vive-2020", "sRGB")
+    ways.show_in_headset(chart, "htc-vive-2020", "sRGB")
     for eye, name in enumerate(("htc-vive-2020", "sRGB")):
         chart[EYE_PROPERTY] = float(eye)
         chart.update_tag()
@@ -53,7 +53,7 @@ def test_eyes_of_known_luminance_show_the_same(chart: bpy.types.Scene, tmp_path:
         profile = replace(load_profile("htc-vive-2020"), name=name, white_luminance_cd_m2=luminance, unit="relative")
         paths.append(tmp_path / f"{name}.json")
         write_profile(profile, paths[-1])
-    left, right = headset.apply(chart, *map(str, paths)).scene_whites
+    left, right = ways.show_in_headset(chart, *map(str, paths)).scene_whites
     assert 100 * left == pytest.approx(80 * right)
     assert right == scene_white(load_profile("htc-vive-2020"))
 
@@ -62,7 +62,7 @@ def test_it_goes_away_without_a_trace(chart: bpy.types.Scene) -> None:
     before = _shown(chart)
     nodes = {material.name: len(material.node_tree.nodes) for material in bpy.data.materials}
     for _ in range(2):
-        headset.apply(chart, "htc-vive-2020", "htc-vive-2021")
+        ways.show_in_headset(chart, "htc-vive-2020", "htc-vive-2021")
     assert len(bpy.data.node_groups) == 3
     assert bpy.ops.spectral_booth.clear_display() == {"FINISHED"}
     assert not bpy.data.node_groups
@@ -71,11 +71,11 @@ def test_it_goes_away_without_a_trace(chart: bpy.types.Scene) -> None:
 
 
 def test_measuring_sees_the_scenes_own_colours(chart: bpy.types.Scene) -> None:
-    headset.apply(chart, "htc-vive-2020")
+    ways.show_in_headset(chart, "htc-vive-2020")
     assert bpy.ops.spectral_booth.calibrate_white() == {"FINISHED"}
-    with headset.scene_linear(chart):
+    with ways.scene_linear(chart):
         inside = _shown(chart)
-    headset.remove(chart)
+    ways.show_in_window(chart)
     np.testing.assert_array_equal(_shown(chart), inside)
 
 

@@ -22,7 +22,8 @@ blender_addon.unregister()  # or the bpy module of 4.5 crashes when it ends
 def _traces() -> tuple[object, ...]:
     types = sorted(name for name in dir(bpy.types) if "pectral" in name or "SPECTRAL" in name)
     handlers = {
-        name: len(getattr(bpy.app.handlers, name)) for name in ("undo_pre", "undo_post", "redo_pre", "redo_post")
+        name: len(getattr(bpy.app.handlers, name))
+        for name in ("undo_pre", "undo_post", "redo_pre", "redo_post", "load_post")
     }
     return (
         types,
@@ -51,7 +52,11 @@ def test_unregister_leaves_nothing_and_register_works_again() -> None:
         assert bare[1] is False
     finally:
         blender_addon.register()
-    assert len(registered[0]) == 15  # eleven operators, a menu and three panels
+    assert {kind: sum(kind in name for name in registered[0]) for kind in ("_OT_", "_MT_", "_PT_")} == {
+        "_OT_": 18,
+        "_MT_": 1,
+        "_PT_": 6,
+    }
 
 
 def test_registration_imports_neither_the_core_nor_colour_science() -> None:

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from blender_addon.bridge import materials, state
+from blender_addon.bridge import shading, state
 from spectral_core.lighting import make_lighting
 from spectral_core.lights import Light
 from spectral_core.surfaces import scene_surfaces
@@ -20,7 +20,7 @@ FLOAT32 = 5e-7
 
 
 def _held(scene: bpy.types.Scene) -> dict[str, np.ndarray]:
-    held = {name: materials.stored_colour(item) for name, item in state.managed_materials(scene).items()}
+    held = {name: shading.stored_colours(item)[0] for name, item in state.managed_materials(scene).items()}
     held.update({f"lamp {lamp[state.LAMP_KEY]}": np.array(lamp.data.color) for lamp in state.managed_lamps(scene)})
     return held
 
@@ -101,7 +101,7 @@ def test_save_and_open_keep_everything(textured: bpy.types.Scene, tmp_path: Path
 
 def test_the_texture_is_packed_in_full_precision(textured: bpy.types.Scene, tmp_path: Path) -> None:
     bpy.ops.spectral_booth.set_light(light="A")
-    image = next(state.managed_images(textured))
+    image = shading.images_in(textured)[0]
     assert image.is_float
     assert image.use_half_precision is False
     assert image.packed_file is not None
@@ -111,9 +111,9 @@ def test_the_texture_is_packed_in_full_precision(textured: bpy.types.Scene, tmp_
     (tmp_path / "panel.npz").unlink()  # the .blend must not need it to show what it showed
     bpy.ops.wm.open_mainfile(filepath=str(path))
     scene = bpy.context.scene
-    image = next(state.managed_images(scene))
+    image = shading.images_in(scene)[0]
     assert image.colorspace_settings.is_data
-    stored = materials.stored_colour(state.managed_materials(scene)["panel"])
+    stored = shading.stored_colours(state.managed_materials(scene)["panel"])[0]
     # float16 would miss by up to 5e-4; values here lie around 1.
     np.testing.assert_allclose(stored, expected, rtol=FLOAT32, atol=FLOAT32)
 
