@@ -45,6 +45,7 @@ benchmarks: $(VENV)/ready
 	$(VENV)/bin/python benchmarks/projection.py
 	$(VENV)/bin/python benchmarks/bake_memory.py
 	$(VENV)/bin/python benchmarks/assigning.py
+	$(VENV)/bin/python benchmarks/relighting.py
 
 system-libraries:
 	sh tools/system_libraries.sh
