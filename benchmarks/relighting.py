@@ -390,6 +390,7 @@ def main() -> None:
     parser.add_argument("--size", default="1280x720", help="of the frame that the texture fills")
     parser.add_argument("--K", type=int, nargs="+", default=list(COEFFICIENTS), help="4, 8 and 12 are timed")
     parser.add_argument("--frames", nargs="*", choices=tuple(BOUNDS), default=list(BOUNDS), help="which are timed")
+    parser.add_argument("--samples", type=int, help="a frame, of those timed: thousands on a graphics card")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     arguments = parser.parse_args()
     size = tuple(int(each) for each in arguments.size.split("x"))
@@ -400,9 +401,9 @@ def main() -> None:
     rows, scenes = table(source_of(arguments.texture), lights, size, arguments.K)
     found = {}
     if "sun" in arguments.frames:
-        found["sun"] = frame_ratios(scenes, SAMPLES["sun"], arguments.rounds)
+        found["sun"] = frame_ratios(scenes, arguments.samples or SAMPLES["sun"], arguments.rounds)
     if "booth" in arguments.frames:
-        found["booth"] = frame_ratios(booth_scenes(), SAMPLES["booth"], arguments.rounds)
+        found["booth"] = frame_ratios(booth_scenes(), arguments.samples or SAMPLES["booth"], arguments.rounds)
     about = {"blender": bpy.app.version_string, "renderer": renderer(), "texture": arguments.texture,
              "lights": list(lights), "size": arguments.size, "rounds": arguments.rounds,
              "load": [load, os.getloadavg()[0]], "processors": os.cpu_count()}  # fmt: skip
