@@ -99,14 +99,13 @@ def encoding_steps(
 
     The tolerance is the largest dE00 of any surface and any pixel, as it is stored.
     """
-    description = state.description(scene)
     surfaces = _surfaces(scene)
     textured = [each for each in surfaces if each.texture is not None]
     uniform = [each for each in surfaces if each.uniform]
     others = surface_samples(uniform, lights) if uniform else None
     packed = yield from packing_steps(
         [each.texture for each in textured if each.texture is not None], lights, tolerance, others, half,
-        codes=CodeTolerance(LARGEST_CODE_DIFFERENCE, description.white.luminance),
+        codes=_codes(scene),
     )  # fmt: skip
     largest = max((each.largest_error for each in packed.textures), default=0.0)
     if others is not None:
@@ -168,7 +167,7 @@ def unknown(scene: bpy.types.Scene, lights: list[Light]) -> list[Light]:
 
 
 def learn(scene: bpy.types.Scene, light: Light) -> float:
-    """Add a light to the scene's basis if that shows it within the tolerance; returns the largest dE00 under it, of all
+    """Add a light to the scene's basis if that shows it within its tolerances; returns the largest dE00 under it, of all
     surfaces and of all pixels as they are stored.
 
     Images and materials stay as they are.
@@ -183,8 +182,14 @@ def learn(scene: bpy.types.Scene, light: Light) -> float:
             stored = shading.stored_coefficients(material)[..., : basis.K]
             error = max(error, stored_error(added, surface.texture, stored, basis.observer))
     if error <= kept.basis_tolerance and light.name not in basis.light_names:
-        keep(scene, extend(basis, added), kept.basis_tolerance, kept.basis_half, max(kept.basis_error, error))
+        learnt = extend(basis, added)
+        if _codes(scene).holds(learnt, samples):
+            keep(scene, learnt, kept.basis_tolerance, kept.basis_half, max(kept.basis_error, error))
     return error
+
+
+def _codes(scene: bpy.types.Scene) -> CodeTolerance:
+    return CodeTolerance(LARGEST_CODE_DIFFERENCE, state.description(scene).white.luminance)
 
 
 def _surfaces(scene: bpy.types.Scene) -> list[Surface]:
