@@ -167,8 +167,9 @@ def unknown(scene: bpy.types.Scene, lights: list[Light]) -> list[Light]:
 
 
 def learn(scene: bpy.types.Scene, light: Light) -> float:
-    """Add a light to the scene's basis if that shows it within its tolerances; returns the largest dE00 under it, of all
-    surfaces and of all pixels as they are stored.
+    """Add a light to the scene's basis if that shows it within its tolerances; returns the largest dE00 under it.
+
+    That is of all surfaces, and of all pixels as they are stored.
 
     Images and materials stay as they are.
     """
