@@ -43,6 +43,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 def build(arguments: argparse.Namespace) -> Result:
     """Build a scene from TOML in an empty file, calibrate its white, save it."""
     from spectral_core.scene import load_scene
+    from spectral_core.steps import finished
 
     from .bridge import build as building
     from .bridge import encoded, lighting, ways
@@ -61,7 +62,7 @@ def build(arguments: argparse.Namespace) -> Result:
     if arguments.live is not None:
         progress(0.6, "encoding the surfaces")
         steps = encoded.encoding_steps(scene, encoded.lights_of(scene), arguments.live, arguments.half)
-        ways.show_encoded(scene, ways.finished(steps))
+        ways.show_encoded(scene, finished(steps))
     if arguments.lamps == "coded":
         ways.set_way(scene, "CODED")
     _save(output)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spectral_core.arrays import Float64Array, frozen
+from spectral_core.arrays import Float64Array
 from spectral_core.display import srgb
 from spectral_core.errors import LightError
 from spectral_core.lights import Light
@@ -99,8 +99,3 @@ def coded_lamps(lamps: Sequence[Parts], level: int, luminance: float) -> CodedLa
             remedy="give lamps the same lights, or use coloured lamps, which are approximate for mixtures",
         )
     return CodedLamps(tuple(lights), level, luminance)
-
-
-def XYZ_to_linear_rgb(XYZ: Float64Array) -> Float64Array:
-    """Linear Rec.709 (..., 3) of XYZ (..., 3), not clipped."""
-    return np.asarray(srgb().to_linear(frozen(XYZ)))

@@ -16,6 +16,7 @@ import bpy
 
 from spectral_core.errors import BlenderError, SpectralBoothError
 from spectral_core.scene import parse_scene
+from spectral_core.steps import finished
 from spectral_core.surfaces import scene_surfaces
 
 from ..eyes import EYE_PROPERTY
@@ -105,7 +106,7 @@ def _show(scene: bpy.types.Scene) -> tuple[str, ...]:
         return ()
     kept = scene.spectral_booth
     steps = encoded.encoding_steps(scene, encoded.lights_of(scene), kept.basis_tolerance, kept.basis_half)
-    encoding = ways.finished(steps)
+    encoding = finished(steps)
     ways.show_encoded(scene, encoding)
     return encoding.notes
 

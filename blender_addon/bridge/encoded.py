@@ -112,7 +112,7 @@ def encoding_steps(
         largest = max(largest, *(each.max for each in packed.basis.measure(others)))
     yield 1.0, "images"
     images = {
-        surface.name: _images(surface.name, texture, half)
+        surface.name: coefficient_images(surface.name, texture, half)
         for surface, texture in zip(textured, packed.textures, strict=True)
     }
     warnings = {each.name: texture.warnings for each, texture in zip(textured, packed.textures, strict=True)}
@@ -198,7 +198,7 @@ def _surfaces(scene: bpy.types.Scene) -> list[Surface]:
     return list({surface.name: surface for _, surface in state.shown_surfaces(scene)}.values())
 
 
-def _images(name: str, texture: PackedTexture, half: bool) -> list[bpy.types.Image]:
+def coefficient_images(name: str, texture: PackedTexture, half: bool) -> list[bpy.types.Image]:
     """Images of a texture's coefficients; its scale is undone, for these floats hold more than 1."""
     found = []
     for number, stored in enumerate(texture.images):

@@ -21,6 +21,7 @@ from spectral_core.imaging import write_png
 from spectral_core.lighting import Lighting
 from spectral_core.report.documents import Document, verify_document
 from spectral_core.scene import LEVELS, SceneDescription, resolve_light
+from spectral_core.steps import finished
 from spectral_core.surfaces import Surface, scene_surfaces
 from spectral_core.verification import (
     LevelResult,
@@ -88,14 +89,7 @@ def verify(
 ) -> list[LightResult]:
     """`verify_steps` in one go."""
     steps = verify_steps(scene, lights, levels, images)
-    while True:
-        try:
-            step = next(steps)
-        except StopIteration as finished:
-            results: list[LightResult] = finished.value
-            return results
-        if progress:
-            progress(step.fraction, step.what)
+    return finished(steps, progress and (lambda step: progress(step.fraction, step.what)))
 
 
 def verify_steps(

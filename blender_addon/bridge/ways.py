@@ -6,10 +6,9 @@ any of it can be changed at any time and back, and the same state always gives t
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from typing import TypeVar
 
 import bpy
 import numpy as np
@@ -18,6 +17,7 @@ from spectral_core.display.export import XYZ_VIEW
 from spectral_core.errors import BlenderError, SpectralBoothError
 from spectral_core.scene import light_parts
 from spectral_core.standards import srgb_to_XYZ_matrix
+from spectral_core.steps import finished
 from spectral_core.surfaces import Surface
 
 from ..eyes import EYE_PROPERTY
@@ -34,7 +34,6 @@ _CHOICES = (
     "basis_tolerance", "basis_half", "basis_error", "basis_notes", "texture_notes",
 )  # fmt: skip
 
-Result = TypeVar("Result")
 Images = Mapping[str, Sequence[bpy.types.Image]]
 
 
@@ -189,16 +188,6 @@ def show_baked(scene: bpy.types.Scene) -> None:
     with _as_before_on_failure(scene):
         encoded.forget(scene)
         rebuild(scene)
-
-
-def finished(steps: Generator[object, None, Result]) -> Result:
-    """What steps return, all taken at once."""
-    while True:
-        try:
-            next(steps)
-        except StopIteration as done:
-            result: Result = done.value
-            return result
 
 
 @contextmanager

@@ -91,12 +91,12 @@ class Stepped:
     def run_at_once(self, context: bpy.types.Context) -> set[str]:
         """All steps."""
         with reported(self) as outcome, busy(context):  # type: ignore[arg-type]
-            self._steps = self._start(context)
-            try:
-                while True:
-                    context.window_manager.progress_update(self._progress(next(self._steps))[0])
-            except StopIteration as finished:
-                self._store(context, finished.value)
+            from spectral_core.steps import finished
+
+            def told(step: Any) -> None:
+                context.window_manager.progress_update(self._progress(step)[0])
+
+            self._store(context, finished(self._start(context), told))
         return outcome.status
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:

@@ -17,6 +17,7 @@ from spectral_core.display import DisplayProfile, srgb
 from spectral_core.imaging import LEVELS, ImageFormat
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
+from spectral_core.steps import finished
 from spectral_core.textures import HyperspectralTexture
 
 
@@ -49,14 +50,7 @@ def bake_to_memory(
         If the texture is not reflectance or damaged.
     """
     steps = baking_steps(texture, lights, profile, image_format, observer, bad_pixels)
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as finished:
-            result: BakedArrays = finished.value
-            return result
-        if progress:
-            progress(fraction, f"baking {texture.name}")
+    return finished(steps, progress and (lambda fraction: progress(fraction, f"baking {texture.name}")))
 
 
 def baking_steps(

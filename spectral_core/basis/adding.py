@@ -17,9 +17,6 @@ from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
 from spectral_core.textures import HyperspectralTexture
 
-# Pixels whose colour difference is computed at a time: what is in between stays in the cache.
-_BLOCK = 16384
-
 
 @dataclass(frozen=True, eq=False)
 class LightAdded:
@@ -86,14 +83,10 @@ def stored_error(
     """
     texture = without_dead_bands(texture)
     weights = level2_weights(texture, [added.light], observer)
-    exact = project(texture, weights, bad_pixels="repair").reshape(-1, 1, 3)
+    exact = project(texture, weights, bad_pixels="repair").astype(np.float64).reshape(-1, 1, 3)
     stored = np.asarray(coefficients).reshape(len(exact), -1)
-    white, largest = added.light.XYZ(observer)[None], 0.0
-    for first in range(0, len(exact), _BLOCK):
-        rows = slice(first, first + _BLOCK)
-        shown = (stored[rows] @ added.synthesis.T)[:, None]
-        largest = max(largest, float(differences(shown, exact[rows].astype(np.float64), white).max()))
-    return largest
+    shown = (stored @ added.synthesis.T)[:, None]
+    return float(differences(shown, exact, added.light.XYZ(observer)[None]).max())
 
 
 def extend(basis: SpectralBasis, added: LightAdded) -> SpectralBasis:

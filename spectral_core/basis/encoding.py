@@ -23,14 +23,13 @@ from spectral_core.baking.projection import (
     projection,
 )
 from spectral_core.baking.strips import check_reflectance
-from spectral_core.basis.metric import differences
+from spectral_core.basis.metric import BLOCK, differences
 from spectral_core.basis.spectral_basis import BasisError, SpectralBasis
 from spectral_core.errors import TextureError
+from spectral_core.steps import finished
 from spectral_core.textures import HyperspectralTexture
 
 CHANNELS = 4
-# Pixels whose colour difference is computed at a time: what is in between stays in the cache.
-_BLOCK = 4096
 # Edges of the histogram that the 95th percentile is taken from: 1 % apart, so it is at most 1 % too large.
 _EDGES = np.geomspace(1e-6, 1e3, 2084)
 _WORST_OF_BLOCK, _WORST = 4, 64
@@ -89,14 +88,7 @@ def encode_texture(
         If the texture is not reflectance or damaged, or far brighter than white.
     """
     steps = encoding_steps(texture, basis, half, bad_pixels)
-    while True:
-        try:
-            fraction = next(steps)
-        except StopIteration as finished:
-            result: PackedTexture = finished.value
-            return result
-        if progress:
-            progress(fraction, f"encoding {texture.name}")
+    return finished(steps, progress and (lambda fraction: progress(fraction, f"encoding {texture.name}")))
 
 
 def encoding_steps(
@@ -145,8 +137,8 @@ def _encode_rows(
     """Write the coefficients of some rows to parts of the images (pixels, 4)."""
     XYZ = np.empty((rows.strip.height * texture.width, how.columns), dtype=np.float32)
     tally = _Tally.empty(basis, project_rows(texture, how, rows, product, XYZ, bad_pixels))
-    for first in range(0, len(XYZ), _BLOCK):
-        exact = _colours(XYZ[first : first + _BLOCK], basis)
+    for first in range(0, len(XYZ), BLOCK):
+        exact = _colours(XYZ[first : first + BLOCK], basis)
         coefficients = basis.coefficients(exact)
         with np.errstate(over="ignore"):
             stored = coefficients.astype(parts[0].dtype)

@@ -13,11 +13,17 @@ from spectral_core.arrays import Float64Array
 # rounding and far below where the form bends.
 _STEP = 1e-3
 _DARKEST = 1e-3
+# Colours whose difference is computed at a time: what is in between stays in the cache.
+BLOCK = 4096
 
 
 def differences(XYZ_a: Float64Array, XYZ_b: Float64Array, whites: Float64Array) -> Float64Array:
     """dE00 (n, lights) of two arrays of XYZ (n, lights, 3) seen under whites (lights, 3)."""
-    return standards.delta_E_2000(lab(XYZ_a, whites), lab(XYZ_b, whites))
+    result = np.empty(XYZ_a.shape[:-1])
+    for first in range(0, len(result), BLOCK):
+        rows = slice(first, first + BLOCK)
+        result[rows] = standards.delta_E_2000(lab(XYZ_a[rows], whites), lab(XYZ_b[rows], whites))
+    return result
 
 
 def lab(XYZ: Float64Array, whites: Float64Array) -> Float64Array:

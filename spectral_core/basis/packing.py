@@ -17,6 +17,7 @@ from spectral_core.basis.spectral_basis import SpectralBasis, check_lights
 from spectral_core.errors import SpectrumError
 from spectral_core.lights import Light
 from spectral_core.standards import DEFAULT_OBSERVER
+from spectral_core.steps import finished
 from spectral_core.textures import HyperspectralTexture
 
 # What the first basis may use of the tolerance: pixels that were not looked at need the rest, and so do half floats,
@@ -75,14 +76,7 @@ def choose_for_textures(
         If the input cannot be used, or half floats round more than the tolerance.
     """
     steps = packing_steps(textures, lights, tolerance_dE00, others, half, observer, codes)
-    while True:
-        try:
-            fraction, what = next(steps)
-        except StopIteration as finished:
-            result: Packed = finished.value
-            return result
-        if progress:
-            progress(fraction, what)
+    return finished(steps, progress and (lambda step: progress(*step)))
 
 
 def packing_steps(
@@ -105,16 +99,7 @@ def packing_steps(
         basis = choose_basis(samples, lights, target, observer, smallest)
         while codes is not None and 3 * len(lights) > basis.K and not codes.holds(basis, samples):
             basis = fit_basis(samples, lights, basis.K + 1, observer)
-        packed = []
-        for index, texture in enumerate(textures):
-            steps = encoding_steps(texture, basis, half)
-            while True:
-                try:
-                    fraction = next(steps)
-                except StopIteration as finished:
-                    packed.append(finished.value)
-                    break
-                yield (index + fraction) / len(textures), f"encoding {texture.name}"
+        packed = yield from _encoding_all(textures, basis, half)
         largest = max((each.largest_error for each in packed), default=0.0)
         if largest <= tolerance_dE00:
             return Packed(basis, tuple(packed), samples)
@@ -131,3 +116,20 @@ def packing_steps(
         target *= max(0.5, min(0.9, tolerance_dE00 / largest))
         smallest = basis.K if attempt < _ROUNDS else basis.K + 1
     raise AssertionError("K = 3 L ends it")
+
+
+def _encoding_all(
+    textures: Sequence[HyperspectralTexture], basis: SpectralBasis, half: bool
+) -> Generator[tuple[float, str], None, list[PackedTexture]]:
+    """All textures, a step at a time."""
+    packed = []
+    for index, texture in enumerate(textures):
+        steps = encoding_steps(texture, basis, half)
+        while True:
+            try:
+                fraction = next(steps)
+            except StopIteration as end:
+                packed.append(end.value)
+                break
+            yield (index + fraction) / len(textures), f"encoding {texture.name}"
+    return packed

@@ -22,8 +22,6 @@ _FORMAT = "spectral-booth basis"
 _VERSION = 1
 # More lights than any scene has: their square is what a file makes us allocate.
 _MOST_LIGHTS = 256
-# Colours whose difference is computed at a time: what is in between stays in the cache.
-_BLOCK = 4096
 
 
 @dataclass(frozen=True)
@@ -143,12 +141,7 @@ class SpectralBasis:
             raise SpectrumError(
                 f"coefficients of shape {stored.shape} for {len(samples)} samples", remedy=f"give (n, {self.K})"
             )
-        whites = self.whites
-        found = np.empty(samples.shape[:2])
-        for first in range(0, len(samples), _BLOCK):
-            block = slice(first, first + _BLOCK)
-            found[block] = differences(self.XYZ(stored[block]), samples[block], whites)
-        return errors_of(found, self.light_names)
+        return errors_of(differences(self.XYZ(stored), samples, self.whites), self.light_names)
 
     def to_json(self) -> dict[str, Any]:
         """Plain numbers and texts that `from_json` makes the same basis of, bit for bit; lights as their nodes."""

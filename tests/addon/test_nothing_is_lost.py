@@ -10,6 +10,7 @@ import pytest
 
 from blender_addon.bridge import adopting, encoded, lighting, materials, shading, state, ways
 from spectral_core.errors import BlenderError, DisplayError, LightError, SpectrumError, TextureError
+from spectral_core.steps import finished
 
 GREY = adopting.Source({"reflectance": 0.5})
 
@@ -87,7 +88,7 @@ def test_a_profile_that_is_gone_changes_nothing(own: bpy.types.Scene) -> None:
 
 def test_coefficients_are_kept_where_their_texture_is_gone(own: bpy.types.Scene, leaf: Path) -> None:
     material = _adopt(own, "leaf", adopting.Source({"texture": str(leaf)}))
-    ways.show_encoded(own, ways.finished(encoded.encoding_steps(own, encoded.lights_of(own), 1.0, False)))
+    ways.show_encoded(own, finished(encoded.encoding_steps(own, encoded.lights_of(own), 1.0, False)))
     before, coefficients = _everything(own), shading.stored_coefficients(material)
     leaf.unlink()
     with pytest.raises(TextureError):
@@ -99,7 +100,7 @@ def test_coefficients_are_kept_where_their_texture_is_gone(own: bpy.types.Scene,
 
 def test_a_basis_whose_text_was_spoilt_can_be_left(own: bpy.types.Scene) -> None:
     _adopt(own, "wall")
-    ways.show_encoded(own, ways.finished(encoded.encoding_steps(own, encoded.lights_of(own), 1.0, False)))
+    ways.show_encoded(own, finished(encoded.encoding_steps(own, encoded.lights_of(own), 1.0, False)))
     own.spectral_booth.basis.write("not JSON")
     with pytest.raises(SpectrumError, match="no JSON"):
         ways.light(own, "A", 2)
@@ -120,7 +121,7 @@ def test_a_copy_of_a_material_is_relit_too(own: bpy.types.Scene) -> None:
 
 def test_copies_of_a_scene_do_not_share_what_one_of_them_changes(own: bpy.types.Scene) -> None:
     _adopt(own, "wall")
-    ways.show_encoded(own, ways.finished(encoded.encoding_steps(own, encoded.lights_of(own), 1.0, False)))
+    ways.show_encoded(own, finished(encoded.encoding_steps(own, encoded.lights_of(own), 1.0, False)))
     bpy.ops.scene.new(type="FULL_COPY")
     copy = bpy.context.scene
     assert copy != own
@@ -294,7 +295,7 @@ def test_images_that_a_user_removed_are_missed(own: bpy.types.Scene, leaf: Path)
         ways.light(own, "A", 2)
     ways.show_baked(own)
     ways.light(own, "A", 2)
-    ways.show_encoded(own, ways.finished(encoded.encoding_steps(own, encoded.lights_of(own), 0.01, False)))
+    ways.show_encoded(own, finished(encoded.encoding_steps(own, encoded.lights_of(own), 0.01, False)))
     first, *rest = shading.images_of(material)
     assert rest  # more than four numbers
     bpy.data.images.remove(first)
