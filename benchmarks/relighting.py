@@ -1,19 +1,16 @@
 """Light switched in a spectral basis, against colours baked for each light, and a plain RGB texture: what each costs.
 
-``python benchmarks/relighting.py [--texture FILE] [--rounds N] [--size 1280x720] [--json]``, on
-the bpy wheel.
+``python benchmarks/relighting.py``, on the bpy wheel; `--help` tells the options.
 
 *Table*: a hyperspectral texture (a fruit of the booth, or a file) under the lights of the ColorChecker's scene, for
-K = 3 to 12 coefficients as half and single floats. dE00 is of all pixels under all lights, of the numbers as they are
-stored, before colours outside Rec.709 are cut off, which all ways do alike. Memory on the graphics card is what the
-images hold; *all* is what must be kept for every light. A switch is `ways.light` and the update of the view layer.
+K = 3 to 12 coefficients as half and single floats. dE00 is of all pixels under all lights, as stored, before colours
+outside Rec.709 are cut off, which all ways do alike. *all* is what must be kept in memory for every light. A switch is
+`ways.light` and the update of the view layer.
 
 *Frames*: K = 12 in three images against an 8-bit sRGB image on the same shader, in the booth with twelve spots and
-shadows, and under one sun where the texture fills the frame.
-
-Frame time is the time of a sample: a render of many less a render of one, which takes away what starting costs. Ways
-take turns within a round, and a ratio is of one round, so that other load falls on both. Beside the ratio of elapsed
-time stands that of processor time of this process, which is what software rendering costs whoever else computes.
+under one sun where the texture fills the frame. Frame time is that of a sample: a render of many less a render of one,
+without what starting costs. Ways take turns within a round, and a ratio is of one round, so that other load falls on
+both. Beside elapsed time stands processor time, which is what software rendering costs whoever else computes.
 """
 
 from __future__ import annotations
@@ -34,7 +31,6 @@ import numpy as np
 
 import blender_addon
 from blender_addon.bridge import build, encoded, lighting, shading, state, ways
-from blender_addon.bridge.images import empty_image, write_image
 from spectral_core.basis import PackedTexture, SpectralBasis, encode_texture, fit_basis, surface_samples
 from spectral_core.basis.metric import differences
 from spectral_core.display import srgb, srgb_encode
@@ -47,12 +43,11 @@ from spectral_core.textures.synthetic.pigments import PIGMENT_TEXTURES
 
 COEFFICIENTS = range(3, 13)
 BOUNDS = {"booth": 1.1, "sun": 1.5}
-# Samples of the long render, by scene: a sample of the booth takes seconds in software.
+# Of the long render; a sample of the booth takes seconds in software.
 SAMPLES = {"booth": 4, "sun": 5}
 # What a frame takes depends on how many images there are, not on how many of their channels are used.
 TIMED = (4, 8, 12)
 MB = 1e6
-_BLOCK = 16384
 _TO_XYZ = srgb_to_XYZ_matrix()
 
 SUN = """
@@ -173,26 +168,12 @@ def basis_scene(
 ) -> bpy.types.Scene:
     """The same scene shown by a basis."""
     scene = built(description, name)
-    images = {surface: coefficient_images(f"{name} {surface}", packed, half) for surface, packed in textures.items()}
+    images = {
+        surface: encoded.coefficient_images(f"{name} {surface}", packed, half) for surface, packed in textures.items()
+    }
     largest = max(each.largest_error for each in textures.values())
     ways.show_encoded(scene, encoded.Encoding(basis, images, max(largest, 1e-3), half, largest, notes=()))
     return scene
-
-
-def coefficient_images(name: str, packed: PackedTexture, half: bool) -> list[bpy.types.Image]:
-    """A texture's coefficients, four to an image."""
-    found = []
-    coefficients = packed.coefficients().astype(np.float32)
-    height, width, K = coefficients.shape
-    for first in range(0, K, 4):
-        image = empty_image(f"{name} {first // 4 + 1}", width, height, half)
-        image[encoded.COEFFICIENTS_KEY] = True
-        four = np.zeros((height, width, 4), dtype=np.float32)
-        part = coefficients[..., first : first + 4]
-        four[..., : part.shape[-1]] = part
-        write_image(image, four)
-        found.append(image)
-    return found
 
 
 def packed_MB(scene: bpy.types.Scene) -> float:
@@ -202,11 +183,7 @@ def packed_MB(scene: bpy.types.Scene) -> float:
 
 def dE00_of(shown: np.ndarray, exact: np.ndarray, whites: np.ndarray) -> tuple[float, float, float]:
     """Mean, 95th percentile and largest dE00 of XYZ (n, L, 3)."""
-    parts = [
-        differences(shown[first : first + _BLOCK], exact[first : first + _BLOCK], whites)
-        for first in range(0, len(exact), _BLOCK)
-    ]
-    found = np.concatenate(parts)
+    found = differences(shown, exact, whites)
     return float(found.mean()), float(np.percentile(found, 95)), float(found.max())
 
 
