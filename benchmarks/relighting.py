@@ -6,7 +6,6 @@
 K = 3 to 12 coefficients as half and single floats. dE00 is of all pixels under all lights, as stored, before colours
 outside Rec.709 are cut off, which all ways do alike. *all* is what must be kept in memory for every light. A switch is
 `ways.light` and the update of the view layer.
-
 *Frames*: K = 12 in three images against an 8-bit sRGB image on the same shader, in the booth with twelve spots and
 under one sun where the texture fills the frame. Frame time is that of a sample: a render of many less a render of one,
 without what starting costs. Ways take turns within a round, and a ratio is of one round, so that other load falls on
